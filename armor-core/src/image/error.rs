@@ -1,0 +1,71 @@
+//! Why bytes are no policy image.
+
+use core::fmt;
+
+use super::SectionKind;
+
+/// The first fault found in an image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ImageError {
+    /// Fewer bytes than the header says.
+    Truncated {
+        /// Bytes that the image needs.
+        expected: usize,
+        /// Bytes that are there.
+        actual: usize,
+    },
+    /// The first byte does not lie on a 16-byte boundary.
+    Misaligned,
+    /// The bytes do not start with `ARMR`.
+    Magic,
+    /// The format version is not the one this code reads.
+    Version(u16),
+    /// The header's own checksum or one of its lengths is wrong.
+    Header,
+    /// The checksum over manifest and sections is wrong.
+    Checksum,
+    /// The manifest cannot be decoded.
+    Manifest,
+    /// A dimension is zero or larger than the format allows.
+    Shape,
+    /// The denoising chains are missing, too long, or do not end at the action.
+    Chain,
+    /// The trained range of the cost budget is empty or its scale is not positive.
+    KappaRange,
+    /// A section is missing, out of order, or its length does not fit the shape.
+    Section(SectionKind),
+    /// A section holds a NaN or an infinity.
+    NotFinite(SectionKind),
+    /// An action bound is reversed, or the fallback action lies outside the bounds.
+    Bounds,
+}
+
+impl fmt::Display for ImageError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Truncated { expected, actual } => {
+                write!(f, "image is cut short: {expected} bytes expected, {actual} found; copy or export it again")
+            }
+            Self::Misaligned => f.write_str("image does not start on a 16-byte boundary; align it in flash"),
+            Self::Magic => f.write_str("not a policy image: it does not start with ARMR"),
+            Self::Version(found) => write!(
+                f,
+                "image format version {found}, but this code reads version {}; export it again with a matching armor-train",
+                super::VERSION
+            ),
+            Self::Header => f.write_str("image header is damaged; copy or export it again"),
+            Self::Checksum => f.write_str("image is damaged: its checksum is wrong; copy or export it again"),
+            Self::Manifest => f.write_str("image manifest cannot be decoded; export it again"),
+            Self::Shape => f.write_str("image has a dimension of zero or beyond the format's limits"),
+            Self::Chain => f.write_str("image has no valid denoising chain"),
+            Self::KappaRange => f.write_str("image has no valid cost budget range"),
+            Self::Section(kind) => write!(f, "image section {kind:?} is missing, misplaced or of the wrong length"),
+            Self::NotFinite(kind) => {
+                write!(f, "image section {kind:?} holds a NaN or an infinity; the training diverged")
+            }
+            Self::Bounds => f.write_str("image has reversed action bounds or a fallback action outside them"),
+        }
+    }
+}
+
+impl core::error::Error for ImageError {}

@@ -1,0 +1,71 @@
+//! The policy image, version 1: what the trainer exports and the controller
+//! flies. `docs/image-format.md` is the normative byte layout.
+//!
+//! Header, manifest (postcard), then sections at 16-byte alignment that are
+//! read in place. Bytes are checked once, in [`PolicyImage::new_checked`];
+//! after `Ok` no accessor fails, allocates or copies.
+
+mod error;
+mod golden;
+mod header;
+mod manifest;
+mod sections;
+mod writer;
+
+pub use error::ImageError;
+pub use golden::{GoldenRow, GoldenTrace};
+pub use header::{ALIGNMENT, HEADER_BYTES, MAGIC, VERSION};
+pub use manifest::{
+    KappaRange, MAX_RUNGS, Manifest, Precision, Provenance, Quality, Rung, SECTION_COUNT, Section, SectionKind,
+};
+pub use sections::{Dense, Sections};
+pub use writer::{WriteError, write};
+
+use header::Header;
+
+/// A policy image whose every byte has been checked.
+#[derive(Clone, Debug)]
+pub struct PolicyImage<'a> {
+    bytes: &'a [u8],
+    manifest: Manifest<'a>,
+    sections: Sections<'a>,
+}
+
+impl<'a> PolicyImage<'a> {
+    /// Checks `bytes` and reads them in place. What follows the image, such as
+    /// the erased rest of a flash slot, is ignored.
+    ///
+    /// # Errors
+    /// An [`ImageError`] that names the first fault: any flipped bit, any
+    /// truncation, any content that the format does not allow.
+    pub fn new_checked(bytes: &'a [u8]) -> Result<Self, ImageError> {
+        let header = Header::read(bytes)?;
+        let bytes = bytes
+            .get(..header.total_length)
+            .ok_or(ImageError::Truncated { expected: header.total_length, actual: bytes.len() })?;
+        let payload = bytes.get(HEADER_BYTES..).ok_or(ImageError::Header)?;
+        if header::checksum(payload) != header.payload_checksum {
+            return Err(ImageError::Checksum);
+        }
+        let (manifest_bytes, body) =
+            payload.split_at_checked(header.manifest_length.next_multiple_of(ALIGNMENT)).ok_or(ImageError::Header)?;
+        let manifest = Manifest::read(manifest_bytes, header.manifest_length)?;
+        let sections = Sections::read(&manifest, body)?;
+        Ok(Self { bytes, manifest, sections })
+    }
+
+    /// The exact bytes of the image, without what follows it.
+    pub const fn bytes(&self) -> &'a [u8] {
+        self.bytes
+    }
+
+    /// What the image says of itself.
+    pub const fn manifest(&self) -> &Manifest<'a> {
+        &self.manifest
+    }
+
+    /// The numbers, in place.
+    pub const fn sections(&self) -> &Sections<'a> {
+        &self.sections
+    }
+}
