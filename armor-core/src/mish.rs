@@ -16,7 +16,7 @@
 pub fn exp(x: f32) -> f32 {
     const MAGIC: f32 = 12_582_912.0; // 1.5 * 2^23
     // ln 2 in two parts; the first has 9 trailing zero bits, so its product with n is exact.
-    const LN2_HIGH: f32 = 0.693_359_375;
+    const LN2_HIGH: f32 = 355.0 / 512.0;
     const LN2_LOW: f32 = -2.121_944_4e-4;
 
     let clipped = if x < 88.0 { x } else { 88.0 };
@@ -31,7 +31,7 @@ pub fn exp(x: f32) -> f32 {
     p = p * r + 8.333_452e-3;
     p = p * r + 4.166_579_6e-2;
     p = p * r + 1.666_666_5e-1;
-    p = p * r + 5.000_000_1e-1;
+    p = p * r + 0.5;
     let mantissa = (p * r) * r + r + 1.0;
 
     let power = f32::from_bits(shifted.to_bits().wrapping_add(127) << 23);

@@ -41,20 +41,22 @@ pub enum Sampler {
 /// x0  = clip(from_action a^n - from_noise eps(a^n, n), bounds)
 /// a^m = to_x0 x0 + to_action a^n + sigma z,    z ~ N(0, I)
 /// ```
+///
+/// The schedule computes it in f64; an image stores it, and a controller flies it, in f32.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ChainStep {
+pub struct ChainStep<T = f32> {
     /// The noise level `n` that the step starts from, `1..=N`.
     pub n: usize,
     /// `1 / sqrt(abar_n)`.
-    pub from_action: f32,
+    pub from_action: T,
     /// `sqrt(1 - abar_n) / sqrt(abar_n)`.
-    pub from_noise: f32,
+    pub from_noise: T,
     /// Weight of the clipped estimate.
-    pub to_x0: f32,
+    pub to_x0: T,
     /// Weight of the action before the step.
-    pub to_action: f32,
+    pub to_action: T,
     /// Standard deviation of the added noise; 0 on the last step and for DDIM.
-    pub sigma: f32,
+    pub sigma: T,
 }
 
 impl VpSchedule {
@@ -75,7 +77,7 @@ impl VpSchedule {
     }
 
     /// The step from level `n` to level `m < n`.
-    pub fn step(&self, sampler: Sampler, n: usize, m: usize) -> ChainStep {
+    pub fn step(&self, sampler: Sampler, n: usize, m: usize) -> ChainStep<f64> {
         let (here, there) = (self.alpha_bar(n), self.alpha_bar(m));
         let (noise_here, noise_there) = (1.0 - here, 1.0 - there);
         let (to_x0, to_action, variance) = match sampler {
@@ -95,22 +97,36 @@ impl VpSchedule {
         };
         ChainStep {
             n,
-            from_action: (1.0 / libm::sqrt(here)) as f32,
-            from_noise: libm::sqrt(noise_here / here) as f32,
-            to_x0: to_x0 as f32,
-            to_action: to_action as f32,
-            sigma: libm::sqrt(variance) as f32,
+            from_action: 1.0 / libm::sqrt(here),
+            from_noise: libm::sqrt(noise_here / here),
+            to_x0,
+            to_action,
+            sigma: libm::sqrt(variance),
         }
     }
 
     /// A chain of `length` steps at evenly spaced levels, from `N` down to 0.
     ///
     /// `length` is taken as at least 1 and at most `N`; with `N` it is the full chain.
-    pub fn chain(&self, sampler: Sampler, length: usize) -> impl ExactSizeIterator<Item = ChainStep> + use<> {
+    pub fn chain(&self, sampler: Sampler, length: usize) -> impl ExactSizeIterator<Item = ChainStep<f64>> + use<> {
         let schedule = *self;
         let length = length.clamp(1, self.steps);
         let level = move |i: usize| (i * schedule.steps).div_ceil(length);
         (0..length).rev().map(move |i| schedule.step(sampler, level(i + 1), level(i)))
+    }
+}
+
+impl ChainStep<f64> {
+    /// The step as a controller flies it.
+    pub const fn to_f32(self) -> ChainStep {
+        ChainStep {
+            n: self.n,
+            from_action: self.from_action as f32,
+            from_noise: self.from_noise as f32,
+            to_x0: self.to_x0 as f32,
+            to_action: self.to_action as f32,
+            sigma: self.sigma as f32,
+        }
     }
 }
 
@@ -119,7 +135,7 @@ impl ChainStep {
     pub const WORDS: usize = 6;
 
     /// The step as it stands in an image: `n`, then the coefficients as f32 bits.
-    pub fn to_words(self) -> [u32; Self::WORDS] {
+    pub const fn to_words(self) -> [u32; Self::WORDS] {
         [
             self.n as u32,
             self.from_action.to_bits(),
@@ -179,9 +195,9 @@ mod tests {
         for n in 1..=20 {
             let (beta, here, there) = (N20.beta(n), N20.alpha_bar(n), N20.alpha_bar(n - 1));
             let step = N20.step(Sampler::Ddpm, n, n - 1);
-            close(step.to_x0.into(), beta * there.sqrt() / (1.0 - here), 1e-7);
-            close(step.to_action.into(), (1.0 - there) * (1.0 - beta).sqrt() / (1.0 - here), 1e-7);
-            close(step.sigma.into(), (beta * (1.0 - there) / (1.0 - here)).sqrt(), 1e-7);
+            close(step.to_x0, beta * there.sqrt() / (1.0 - here), 1e-12);
+            close(step.to_action, (1.0 - there) * (1.0 - beta).sqrt() / (1.0 - here), 1e-12);
+            close(step.sigma, (beta * (1.0 - there) / (1.0 - here)).sqrt(), 1e-12);
         }
     }
 
@@ -203,9 +219,9 @@ mod tests {
                 levels.push(0);
                 for (step, m) in N20.chain(sampler, length).zip(levels) {
                     let (here, there) = (N20.alpha_bar(step.n), N20.alpha_bar(m));
-                    let (to_x0, to_action) = (f64::from(step.to_x0), f64::from(step.to_action));
-                    close(to_x0 + to_action * here.sqrt(), there.sqrt(), 1e-6);
-                    close(to_action.powi(2) * (1.0 - here) + f64::from(step.sigma).powi(2), 1.0 - there, 1e-6);
+                    let (to_x0, to_action) = (step.to_x0, step.to_action);
+                    close(to_x0 + to_action * here.sqrt(), there.sqrt(), 1e-12);
+                    close(to_action.powi(2) * (1.0 - here) + step.sigma.powi(2), 1.0 - there, 1e-12);
                 }
             }
         }
@@ -223,7 +239,7 @@ mod tests {
 
     #[test]
     fn words_bring_a_step_back() {
-        let step = N20.step(Sampler::Ddpm, 7, 6);
+        let step = N20.step(Sampler::Ddpm, 7, 6).to_f32();
         assert_eq!(ChainStep::from_words(step.to_words()), step);
     }
 }

@@ -1,1 +1,31 @@
-//! placeholder
+//! The paper: a safe robot policy from recorded data.
+//!
+//! | paper | here |
+//! |---|---|
+//! | section 3.1, cost thresholds | [`data`] |
+//! | Eqs. 2 to 4, multi-task critic | [`critic`] |
+//! | Eq. 5, gradient surgery | [`pcgrad`] |
+//! | Eqs. 6 and 7, trajectory weights | [`reweight::trajectory`] |
+//! | Eqs. 8 and 9, counterfactual weights | [`reweight::counterfactual`] |
+//! | Eq. 10, combined weights | [`reweight`] |
+//! | Eqs. 11 to 15, diffusion actor | [`actor`] |
+//! | Eq. 16, dual variable | [`dual`] |
+//! | section 3, one training step | [`learner`], [`update`] |
+//! | Table 2, hyperparameters | [`config`] |
+
+pub mod actor;
+pub mod batch;
+pub mod config;
+pub mod critic;
+pub mod data;
+pub mod dual;
+pub mod learner;
+pub mod model;
+pub mod nn;
+pub mod normaliser;
+pub mod pcgrad;
+pub mod reweight;
+mod stream;
+#[cfg(test)]
+mod testing;
+pub mod update;

@@ -30,7 +30,7 @@ pub enum ImageError {
     Shape,
     /// The denoising chains are missing, too long, or do not end at the action.
     Chain,
-    /// The trained range of the cost budget is empty or its scale is not positive.
+    /// The scale of the cost budget is not a finite positive number.
     KappaRange,
     /// A section is missing, out of order, or its length does not fit the shape.
     Section(SectionKind),
@@ -58,7 +58,7 @@ impl fmt::Display for ImageError {
             Self::Manifest => f.write_str("image manifest cannot be decoded; export it again"),
             Self::Shape => f.write_str("image has a dimension of zero or beyond the format's limits"),
             Self::Chain => f.write_str("image has no valid denoising chain"),
-            Self::KappaRange => f.write_str("image has no valid cost budget range"),
+            Self::KappaRange => f.write_str("image has no valid scale of the cost budget"),
             Self::Section(kind) => write!(f, "image section {kind:?} is missing, misplaced or of the wrong length"),
             Self::NotFinite(kind) => {
                 write!(f, "image section {kind:?} holds a NaN or an infinity; the training diverged")

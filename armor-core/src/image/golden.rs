@@ -53,7 +53,8 @@ impl<'a> GoldenTrace<'a> {
     /// The steps of the episode.
     pub fn rows(&self) -> impl ExactSizeIterator<Item = GoldenRow<'a>> + use<'a> {
         let (state, action) = (self.state, self.action);
-        self.rows.chunks_exact(Self::row_words(state, action)).map(move |row| {
+        // A row has at least two words; `max` tells the compiler, which else keeps a panic.
+        self.rows.chunks_exact(Self::row_words(state, action).max(2)).map(move |row| {
             let (state, rest) = row.split_at_checked(state).unwrap_or_default();
             let (&[incurred, kappa], action) = rest.split_first_chunk().unwrap_or((&[0, 0], &[]));
             GoldenRow {

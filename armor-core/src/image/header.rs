@@ -35,7 +35,7 @@ impl Header {
     pub(super) fn read(bytes: &[u8]) -> Result<Self, ImageError> {
         let header: &[u8; HEADER_BYTES] =
             bytes.first_chunk().ok_or(ImageError::Truncated { expected: HEADER_BYTES, actual: bytes.len() })?;
-        if bytes.as_ptr().addr() % ALIGNMENT != 0 {
+        if !bytes.as_ptr().addr().is_multiple_of(ALIGNMENT) {
             return Err(ImageError::Misaligned);
         }
         let [m0, m1, m2, m3, v0, v1, rest @ ..] = header;

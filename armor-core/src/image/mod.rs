@@ -6,6 +6,8 @@
 //! after `Ok` no accessor fails, allocates or copies.
 
 mod error;
+#[cfg(test)]
+mod fixture;
 mod golden;
 mod header;
 mod manifest;
@@ -47,8 +49,8 @@ impl<'a> PolicyImage<'a> {
         if header::checksum(payload) != header.payload_checksum {
             return Err(ImageError::Checksum);
         }
-        let (manifest_bytes, body) =
-            payload.split_at_checked(header.manifest_length.next_multiple_of(ALIGNMENT)).ok_or(ImageError::Header)?;
+        let padded_length = header.manifest_length.checked_next_multiple_of(ALIGNMENT).ok_or(ImageError::Header)?;
+        let (manifest_bytes, body) = payload.split_at_checked(padded_length).ok_or(ImageError::Header)?;
         let manifest = Manifest::read(manifest_bytes, header.manifest_length)?;
         let sections = Sections::read(&manifest, body)?;
         Ok(Self { bytes, manifest, sections })
@@ -69,3 +71,6 @@ impl<'a> PolicyImage<'a> {
         &self.sections
     }
 }
+
+#[cfg(test)]
+mod tests;

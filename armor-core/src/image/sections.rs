@@ -54,11 +54,16 @@ pub struct Sections<'a> {
 impl<'a> Sections<'a> {
     /// The steps of rung `index`; none if there is no such rung.
     pub fn chain(&self, manifest: &Manifest<'_>, index: usize) -> impl ExactSizeIterator<Item = ChainStep> + use<'a> {
+        self.chain_words(manifest, index).iter().map(|words| ChainStep::from_words(*words))
+    }
+
+    /// The steps of rung `index` as they stand in the image
+    /// ([`ChainStep::to_words`]); empty if there is no such rung.
+    pub fn chain_words(&self, manifest: &Manifest<'_>, index: usize) -> &'a [[u32; ChainStep::WORDS]] {
         let steps = |rung: &super::Rung| usize::from(rung.steps);
         let first: usize = manifest.rungs.iter().take(index).map(steps).sum();
         let length = manifest.rungs.get(index).map_or(0, steps);
-        let words = self.chain.get(first..).and_then(|rest| rest.get(..length)).unwrap_or_default();
-        words.iter().map(|words| ChainStep::from_words(*words))
+        self.chain.get(first..).and_then(|rest| rest.get(..length)).unwrap_or_default()
     }
 
     pub(super) fn read(manifest: &Manifest<'_>, body: &'a [u8]) -> Result<Self, ImageError> {

@@ -1,0 +1,146 @@
+//! Policy images for tests: well formed, and broken in one place.
+
+use super::header::{Header, checksum};
+use super::*;
+use crate::schedule::{Sampler, VpSchedule};
+use crate::shape::Shape;
+use crate::units::Cost;
+use std::vec;
+use std::vec::Vec;
+
+/// Dimensions that all differ, so that no two sections can be taken for each other.
+pub(super) const SHAPE: Shape = Shape { state: 3, action: 2, hidden: 5, kappa_hidden: 4, kappa_embedding: 6, steps: 7 };
+/// The smallest image, for tests over all its bytes.
+pub(super) const TINY: Shape = Shape { state: 1, action: 1, hidden: 1, kappa_hidden: 1, kappa_embedding: 1, steps: 1 };
+
+/// Bytes on a 16-byte boundary.
+pub(super) struct Aligned(pub(super) Vec<u128>);
+
+impl Aligned {
+    pub(super) fn zeros(bytes: usize) -> Self {
+        Self(vec![0; bytes.div_ceil(16)])
+    }
+
+    pub(super) fn bytes(&mut self) -> &mut [u8] {
+        bytemuck::cast_slice_mut(&mut self.0)
+    }
+}
+
+/// What an image is written from.
+#[derive(Clone)]
+pub(super) struct Parts {
+    pub(super) manifest: Manifest<'static>,
+    pub(super) contents: Vec<Vec<u32>>,
+}
+
+impl Parts {
+    /// Every word is its own number, except where the format says more.
+    pub(super) fn new(shape: Shape) -> Self {
+        let schedule = VpSchedule::new(shape.steps.into());
+        let rungs = [Rung { sampler: Sampler::Ddpm, steps: shape.steps }, Rung { sampler: Sampler::Ddim, steps: 1 }];
+        let quality =
+            Quality { rung: 1, limit: Cost::from_raw(99), episodes: 20, reward_normalized: 0.25, cost_normalized: 0.5 };
+        let manifest = Manifest {
+            task: "ball-run",
+            shape,
+            precision: Precision::F32,
+            kappa: KappaRange { scale: 0.05, trained_max: Cost::from_raw(80 << 16) },
+            schedule,
+            rungs: rungs.into_iter().collect(),
+            provenance: Provenance {
+                version: "0.1.0",
+                preset: "paper",
+                seed: u64::MAX,
+                steps: 200_000,
+                data_sha256: [1; 32],
+                config_sha256: [2; 32],
+            },
+            agreement_max_abs: 1e-6,
+            quality: core::iter::once(quality).collect(),
+            sections: Default::default(),
+        };
+        let [s, a, h, k, e, n] =
+            [shape.state, shape.action, shape.hidden, shape.kappa_hidden, shape.kappa_embedding, shape.steps]
+                .map(usize::from);
+        let lengths = [
+            2 * s,
+            3 * a,
+            2 * k,
+            (k + 1) * k,
+            (k + 1) * e,
+            (s + e + 1) * h,
+            n * h,
+            a * h,
+            (h + 1) * h,
+            (h + 1) * h,
+            (h + 1) * a,
+        ];
+        let mut contents: Vec<Vec<u32>> = (1..)
+            .zip(lengths)
+            .map(|(section, length)| (0..length as u32).map(|i| word(section, i)).collect())
+            .collect();
+        contents[SectionKind::ActionBounds as usize] =
+            [vec![(-1.0f32).to_bits(); a], vec![1.0f32.to_bits(); a], vec![0; a]].concat();
+        let steps = rungs.iter().flat_map(|rung| schedule.chain(rung.sampler, rung.steps.into()));
+        contents.push(steps.flat_map(|step| step.to_f32().to_words()).collect());
+        let row = (0..GoldenTrace::row_words(s, a) as u32).map(|i| word(13, i));
+        contents.push([7, 8, 5 << 16, 1].into_iter().chain(row).collect());
+        Self { manifest, contents }
+    }
+
+    pub(super) fn section(&mut self, kind: SectionKind) -> &mut Vec<u32> {
+        &mut self.contents[kind as usize]
+    }
+
+    pub(super) fn write_into(&self, out: &mut [u8]) -> Result<usize, WriteError> {
+        write(&self.manifest, &core::array::from_fn(|i| self.contents[i].as_slice()), out)
+    }
+
+    /// The image and its length.
+    pub(super) fn build(&self) -> (Aligned, usize) {
+        let mut memory = Aligned::zeros(4096);
+        let length = self.write_into(memory.bytes()).unwrap();
+        (memory, length)
+    }
+
+    /// Why these parts make no image.
+    #[track_caller]
+    pub(super) fn fault(&self) -> ImageError {
+        match self.write_into(Aligned::zeros(4096).bytes()) {
+            Err(WriteError::Invalid(error)) => error,
+            other => panic!("{other:?}"),
+        }
+    }
+}
+
+/// The `i`-th word of a section: a float that no other place holds.
+pub(super) fn word(section: u32, i: u32) -> u32 {
+    (section as f32 + i as f32 / 1024.0).to_bits()
+}
+
+pub(super) fn words(values: &[f32]) -> Vec<u32> {
+    values.iter().map(|value| value.to_bits()).collect()
+}
+
+/// An image with valid checksums around any manifest bytes and body.
+pub(super) fn seal(manifest: &[u8], padding: u8, body: &[u8], manifest_length: usize) -> Result<(), ImageError> {
+    let padded = [manifest, &vec![padding; manifest.len().next_multiple_of(ALIGNMENT) - manifest.len()]].concat();
+    let payload = [&padded, body].concat();
+    let total_length = HEADER_BYTES + payload.len();
+    let header = Header { manifest_length, total_length, payload_checksum: checksum(&payload) };
+    let mut memory = Aligned::zeros(total_length);
+    memory.bytes()[..total_length].copy_from_slice(&[&header.write()[..], &payload].concat());
+    PolicyImage::new_checked(memory.bytes()).map(drop)
+}
+
+/// Seals the parts again, with a manifest that `edit` has changed.
+pub(super) fn resealed(edit: impl FnOnce(&mut Manifest<'_>)) -> Result<(), ImageError> {
+    let (mut memory, _) = Parts::new(SHAPE).build();
+    let image = PolicyImage::new_checked(memory.bytes()).unwrap();
+    let mut manifest = image.manifest().clone();
+    let mut buffer = [0; 1024];
+    let body = HEADER_BYTES + postcard::to_slice(&manifest, &mut buffer).unwrap().len().next_multiple_of(ALIGNMENT);
+    edit(&mut manifest);
+    let encoded = postcard::to_slice(&manifest, &mut buffer).unwrap();
+    seal(encoded, 0, &image.bytes()[body..], encoded.len())
+}

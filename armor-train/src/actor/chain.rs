@@ -1,0 +1,103 @@
+//! Sampling from the policy, `a ~ pi(.|s, kappa)`, with or without a gradient
+//! (Eq. 12): the trainer's side of the chain that the controller flies.
+
+use armor_core::schedule::ChainStep;
+use nalgebra::DMatrix;
+
+use super::denoiser::{Call, Context, Denoiser};
+use crate::nn::Scalar;
+
+/// Where a chain takes its noise from: `draw(stage, sample, out)` fills `out`
+/// `[A]` with standard normal draws; stage 0 is the start `a^N`, stage `i + 1` the
+/// noise added by step `i`.
+pub type Draw<'a, T> = dyn Fn(usize, usize, &mut [T]) + Sync + 'a;
+
+/// A chain that remembers its calls, for a gradient.
+#[derive(Clone, Debug)]
+pub struct Chain<T: Scalar> {
+    steps: Vec<ChainStep<f64>>,
+    calls: Vec<Call<T>>,
+    /// 1 where the estimate `x0` of a step lay within the bounds, 0 where it was clipped.
+    inside: Vec<DMatrix<T>>,
+    /// The actions, `A x B`: the end of the chain.
+    pub action: DMatrix<T>,
+}
+
+impl<T: Scalar> Chain<T> {
+    /// Room for the given steps on `samples` columns; with `gradient`, room for every call of the network.
+    pub fn new(denoiser: &Denoiser, steps: Vec<ChainStep<f64>>, samples: usize, gradient: bool) -> Self {
+        let remembered = if gradient { steps.len() } else { 1 };
+        let action = DMatrix::zeros(denoiser.widths().action, samples);
+        Self {
+            calls: (0..remembered).map(|_| denoiser.call(samples)).collect(),
+            inside: vec![action.clone(); remembered],
+            steps,
+            action,
+        }
+    }
+
+    /// Runs the chain in a prepared context; its end is [`Chain::action`].
+    pub fn run(&mut self, denoiser: &Denoiser, parameters: &[T], context: &Context<T>, draw: &Draw<'_, T>) {
+        let rows = self.action.nrows();
+        let gradient = self.calls.len() == self.steps.len();
+        let mut noise = vec![T::zero(); rows];
+        for (sample, mut column) in self.action.column_iter_mut().enumerate() {
+            draw(0, sample, &mut noise);
+            column.copy_from_slice(&noise);
+        }
+        for (index, step) in self.steps.iter().enumerate() {
+            let slot = if gradient { index } else { 0 };
+            let call = &mut self.calls[slot];
+            call.action.copy_from(&self.action);
+            call.levels.fill(step.n);
+            denoiser.forward(parameters, context, call, gradient);
+            let [from_action, from_noise, to_x0, to_action, sigma] = coefficients::<T>(step);
+            for (sample, mut column) in self.action.column_iter_mut().enumerate() {
+                if step.sigma != 0.0 {
+                    draw(index + 1, sample, &mut noise);
+                }
+                for (row, action) in column.iter_mut().enumerate() {
+                    let estimate = from_action * *action - from_noise * call.noise()[(row, sample)];
+                    let (x0, inside) = clip(estimate);
+                    self.inside[slot][(row, sample)] = inside;
+                    *action = to_x0 * x0 + to_action * *action;
+                    if step.sigma != 0.0 {
+                        *action += sigma * noise[row];
+                    }
+                }
+            }
+        }
+    }
+
+    /// Back-propagates `action_gradient`, `A x B`, with respect to the end of
+    /// the last run; adds to `gradient` and to the gradients in `context`.
+    pub fn backward(
+        &mut self,
+        denoiser: &Denoiser,
+        parameters: &[T],
+        context: &mut Context<T>,
+        action_gradient: &DMatrix<T>,
+        gradient: &mut [T],
+    ) {
+        let mut after = action_gradient.clone();
+        for ((step, call), inside) in self.steps.iter().zip(&mut self.calls).zip(&self.inside).rev() {
+            let [from_action, from_noise, to_x0, to_action, _] = coefficients::<T>(step);
+            // The gradient with respect to the estimate; a clipped entry passes none.
+            let estimate = after.component_mul(inside) * to_x0;
+            call.noise_gradient().copy_from(&(&estimate * -from_noise));
+            denoiser.backward(parameters, context, call, gradient);
+            after = after * to_action + estimate * from_action + &call.action_gradient;
+        }
+    }
+}
+
+/// The coefficients `from_action, from_noise, to_x0, to_action, sigma` of a step.
+pub(super) fn coefficients<T: Scalar>(step: &ChainStep<f64>) -> [T; 5] {
+    [step.from_action, step.from_noise, step.to_x0, step.to_action, step.sigma].map(T::of)
+}
+
+/// A value clipped to the action bounds -1 to 1, and 1 if it lay inside, else 0.
+pub(super) fn clip<T: Scalar>(value: T) -> (T, T) {
+    let clipped = value.max(-T::one()).min(T::one());
+    (clipped, if clipped == value { T::one() } else { T::zero() })
+}

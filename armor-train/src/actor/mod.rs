@@ -1,0 +1,269 @@
+//! The conditional diffusion actor (section 3.4, Eqs. 11 to 15).
+//!
+//! ```text
+//! L_BC  = mean_b w_b |eps_hat(a^n, s, kappa, n) - eps|^2            a^n = sqrt(abar_n) a + sqrt(1 - abar_n) eps
+//! L_phi = L_BC - eta mean_b Q_r(s, kappa, a_pi) + mean_b lambda(kappa) (Q_cL(s, kappa, a_pi) - kappa)
+//! ```
+
+pub mod chain;
+pub mod denoiser;
+
+use armor_core::schedule::{Sampler, VpSchedule};
+use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
+
+use crate::batch::Batch;
+use crate::critic::{Critic, CriticTape, Task};
+use crate::dual::{Dual, DualTape};
+use crate::nn::Scalar;
+use chain::{Chain, Draw, clip, coefficients};
+use denoiser::{Call, Context, Denoiser};
+
+/// Where the action `a_pi` of the policy improvement comes from, and how its gradient flows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PolicyGradient {
+    /// A sample of the full chain, with the gradient through all its steps (the paper).
+    Full,
+    /// The estimate `x0` from the noised data action of `L_BC`: no further call of the network.
+    OneStep,
+}
+
+/// The actor: its network, its schedule, and how it is improved.
+#[derive(Clone, Debug)]
+pub struct Actor {
+    /// The noise predictor.
+    pub denoiser: Denoiser,
+    /// The forward process.
+    pub schedule: VpSchedule,
+    /// How the policy improvement differentiates.
+    pub policy_gradient: PolicyGradient,
+    /// Reward guidance coefficient, eta of Eq. 14.
+    pub eta: f64,
+}
+
+/// What an update of the actor and the dual needs, for a share of the batch.
+#[derive(Clone, Debug)]
+pub struct ActorTape<T: Scalar> {
+    context: Context<T>,
+    call: Call<T>,
+    chain: Chain<T>,
+    /// Whether the one-step estimate lay within the bounds, `A x B`.
+    inside: DMatrix<T>,
+    critic: CriticTape<T>,
+    dual: DualTape<T>,
+    /// The policy's actions `a_pi`, `A x B`.
+    pub action: DMatrix<T>,
+    /// `Q_cL - kappa` at `a_pi` `[B]`.
+    pub violation: Vec<T>,
+    action_gradient: DMatrix<T>,
+}
+
+/// What the update minimises: sums over a share of the batch, or means over all of it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ActorLoss {
+    /// `w |eps_hat - eps|^2` (Eq. 13).
+    pub cloning: f64,
+    /// `Q_r(s, kappa, a_pi)`.
+    pub reward: f64,
+    /// `Q_cL(s, kappa, a_pi)`.
+    pub long_cost: f64,
+    /// `lambda(kappa) (Q_cL - kappa)`, the negative of Eq. 16.
+    pub penalty: f64,
+    /// `lambda(kappa)`.
+    pub lambda: f64,
+}
+
+impl std::ops::Add for ActorLoss {
+    type Output = Self;
+    fn add(self, other: Self) -> Self {
+        Self {
+            cloning: self.cloning + other.cloning,
+            reward: self.reward + other.reward,
+            long_cost: self.long_cost + other.long_cost,
+            penalty: self.penalty + other.penalty,
+            lambda: self.lambda + other.lambda,
+        }
+    }
+}
+
+impl std::ops::Mul<f64> for ActorLoss {
+    type Output = Self;
+    fn mul(self, factor: f64) -> Self {
+        Self {
+            cloning: self.cloning * factor,
+            reward: self.reward * factor,
+            long_cost: self.long_cost * factor,
+            penalty: self.penalty * factor,
+            lambda: self.lambda * factor,
+        }
+    }
+}
+
+/// The noise of one update: levels `[B]`, cloning noise `A x B`, and the chain's draws.
+pub struct ActorNoise<'a, T: Scalar> {
+    /// Noise level of each sample, `1..=N`.
+    pub levels: &'a [usize],
+    /// `eps` of Eq. 13.
+    pub cloning: &'a DMatrix<T>,
+    /// Draws of the chain behind `a_pi`.
+    pub chain: &'a Draw<'a, T>,
+}
+
+/// The networks that judge the actor, frozen during its update.
+#[derive(Clone, Copy)]
+pub struct Judges<'a, T: Scalar> {
+    /// The live critic and its parameters.
+    pub critic: (&'a Critic, &'a [T]),
+    /// The dual network and its parameters.
+    pub dual: (&'a Dual, &'a [T]),
+}
+
+impl Actor {
+    /// Room for updates on `samples` columns.
+    pub fn tape<T: Scalar>(&self, critic: &Critic, dual: &Dual, samples: usize) -> ActorTape<T> {
+        let steps: Vec<_> = match self.policy_gradient {
+            PolicyGradient::Full => self.schedule.chain(Sampler::Ddpm, self.schedule.steps).collect(),
+            PolicyGradient::OneStep => Vec::new(),
+        };
+        let action = || DMatrix::zeros(self.denoiser.widths().action, samples);
+        ActorTape {
+            context: self.denoiser.context(samples),
+            call: self.denoiser.call(samples),
+            chain: Chain::new(&self.denoiser, steps, samples, true),
+            inside: action(),
+            critic: critic.tape(samples),
+            dual: dual.tape(samples),
+            action: action(),
+            violation: vec![T::zero(); samples],
+            action_gradient: action(),
+        }
+    }
+
+    /// The gradients of `L_phi` (Eq. 15) and of `L_lambda` (Eq. 16), added to
+    /// `gradient` and `dual_gradient`; means are over `batch_len` samples, of which
+    /// `batch` is a share.
+    pub fn backward<T: Scalar>(
+        &self,
+        parameters: &[T],
+        judges: Judges<'_, T>,
+        (batch, batch_len): (&Batch<T>, usize),
+        noise: &ActorNoise<'_, T>,
+        tape: &mut ActorTape<T>,
+        (gradient, dual_gradient): (&mut [T], &mut [T]),
+    ) -> ActorLoss {
+        let share = T::of(1.0 / batch_len as f64);
+        self.denoiser.prepare(parameters, &batch.state, &batch.kappa, &mut tape.context);
+        let cloning = self.clone_behaviour(parameters, batch, share, noise, tape);
+        self.sample(parameters, noise, tape);
+
+        let (critic, critic_parameters) = judges.critic;
+        let tasks = [Task::Reward, Task::LongCost];
+        let at_policy = (&batch.state, &batch.kappa[..], &tape.action);
+        critic.forward(critic_parameters, &tasks, at_policy, &mut tape.critic, true);
+        let pairs = tape.critic.pessimistic(Task::LongCost).zip(&batch.kappa);
+        for (violation, (q, &kappa)) in tape.violation.iter_mut().zip(pairs) {
+            *violation = q - kappa;
+        }
+        let sum = |task| tape.critic.pessimistic(task).map(T::to_f64).sum();
+        let (reward, long_cost) = (sum(Task::Reward), sum(Task::LongCost));
+
+        let (dual, dual_parameters) = judges.dual;
+        dual.forward(dual_parameters, &batch.kappa, &mut tape.dual);
+        let dual_loss = dual.backward(dual_parameters, &tape.violation, batch_len, &mut tape.dual, dual_gradient);
+
+        let reward_slope = vec![-T::of(self.eta) * share; batch.len()];
+        let cost_slope: Vec<T> = tape.dual.lambda.iter().map(|&lambda| lambda * share).collect();
+        let slopes = [(Task::Reward, &reward_slope[..]), (Task::LongCost, &cost_slope[..])];
+        critic.action_gradient(critic_parameters, &slopes, &mut tape.critic, &mut tape.action_gradient);
+
+        self.improve(parameters, noise, tape, gradient);
+        self.denoiser.backward(parameters, &mut tape.context, &mut tape.call, gradient);
+        self.denoiser.finish(parameters, &batch.state, &mut tape.context, gradient);
+        ActorLoss {
+            cloning,
+            reward,
+            long_cost,
+            penalty: -dual_loss,
+            lambda: tape.dual.lambda.iter().map(|lambda| lambda.to_f64()).sum(),
+        }
+    }
+
+    /// Eqs. 11 and 13: noises the recorded actions, predicts the noise, and sets
+    /// the gradient of `L_BC` with respect to the prediction. Returns the summed loss.
+    fn clone_behaviour<T: Scalar>(
+        &self,
+        parameters: &[T],
+        batch: &Batch<T>,
+        share: T,
+        noise: &ActorNoise<'_, T>,
+        tape: &mut ActorTape<T>,
+    ) -> f64 {
+        let call = &mut tape.call;
+        call.levels.copy_from_slice(noise.levels);
+        for (sample, &level) in noise.levels.iter().enumerate() {
+            let alpha_bar = self.schedule.alpha_bar(level);
+            let (signal, spread) = (T::of(alpha_bar.sqrt()), T::of((1.0 - alpha_bar).sqrt()));
+            let noised = batch.action.column(sample) * signal + noise.cloning.column(sample) * spread;
+            call.action.set_column(sample, &noised);
+        }
+        self.denoiser.forward(parameters, &tape.context, call, true);
+        let mut loss = 0.0;
+        for (sample, &weight) in batch.weight.iter().enumerate() {
+            let error = call.noise().column(sample) - noise.cloning.column(sample);
+            loss += (weight * error.norm_squared()).to_f64();
+            call.noise_gradient().set_column(sample, &(error * (T::of(2.0) * weight * share)));
+        }
+        loss
+    }
+
+    /// `a_pi`, by the full chain or by the one-step estimate.
+    fn sample<T: Scalar>(&self, parameters: &[T], noise: &ActorNoise<'_, T>, tape: &mut ActorTape<T>) {
+        match self.policy_gradient {
+            PolicyGradient::Full => {
+                tape.chain.run(&self.denoiser, parameters, &tape.context, noise.chain);
+                tape.action.copy_from(&tape.chain.action);
+            }
+            PolicyGradient::OneStep => {
+                for (sample, &level) in noise.levels.iter().enumerate() {
+                    let [from_action, from_noise, ..] = self.estimate::<T>(level);
+                    for row in 0..tape.action.nrows() {
+                        let at = (row, sample);
+                        let estimate = from_action * tape.call.action[at] - from_noise * tape.call.noise()[at];
+                        (tape.action[at], tape.inside[at]) = clip(estimate);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Carries the critics' gradient at `a_pi` back to the network.
+    fn improve<T: Scalar>(
+        &self,
+        parameters: &[T],
+        noise: &ActorNoise<'_, T>,
+        tape: &mut ActorTape<T>,
+        gradient: &mut [T],
+    ) {
+        let ActorTape { context, call, chain, inside, action_gradient, .. } = tape;
+        match self.policy_gradient {
+            PolicyGradient::Full => chain.backward(&self.denoiser, parameters, context, action_gradient, gradient),
+            PolicyGradient::OneStep => {
+                for (sample, &level) in noise.levels.iter().enumerate() {
+                    let [_, from_noise, ..] = self.estimate::<T>(level);
+                    let through = action_gradient.column(sample).component_mul(&inside.column(sample));
+                    let mut noise_gradient = call.noise_gradient().column_mut(sample);
+                    noise_gradient -= through * from_noise;
+                }
+            }
+        }
+    }
+
+    /// The coefficients of the estimate of `x0` at a noise level.
+    fn estimate<T: Scalar>(&self, level: usize) -> [T; 5] {
+        coefficients(&self.schedule.step(Sampler::Ddpm, level, level - 1))
+    }
+}
+
+#[cfg(test)]
+mod tests;

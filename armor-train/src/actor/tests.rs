@@ -1,0 +1,141 @@
+//! Gradients of the whole actor by finite differences, in f64.
+
+use armor_core::schedule::{Sampler, VpSchedule};
+use nalgebra::DMatrix;
+
+use super::denoiser::{Denoiser, Widths};
+use super::*;
+use crate::testing::{assert_gradient, fill};
+
+const SAMPLES: usize = 4;
+const STEPS: usize = 20;
+const LEVELS: [usize; SAMPLES] = [1, 7, 13, 20];
+
+const WIDTHS: Widths = Widths {
+    state: 3,
+    action: 2,
+    hidden: 6,
+    kappa_hidden: 4,
+    kappa_embedding: 3,
+    time_code: 4,
+    time_hidden: 5,
+    time_embedding: 3,
+    steps: STEPS,
+};
+
+struct Fixture {
+    actor: Actor,
+    critic: Critic,
+    dual: Dual,
+    parameters: Vec<f64>,
+    critic_parameters: Vec<f64>,
+    dual_parameters: Vec<f64>,
+    batch: Batch<f64>,
+    cloning: DMatrix<f64>,
+}
+
+fn fixture(policy_gradient: PolicyGradient) -> Fixture {
+    let denoiser = Denoiser::new(WIDTHS, 0.5);
+    let critic = Critic::new(3, 2, 6, 5, 0.5);
+    let dual = Dual::new(5, 0.5);
+    let mut batch = Batch::zeros(3, 2, SAMPLES);
+    batch.state = DMatrix::from_vec(3, SAMPLES, fill(3 * SAMPLES, 11));
+    batch.action = DMatrix::from_vec(2, SAMPLES, fill(2 * SAMPLES, 12));
+    batch.kappa = vec![0.0, 1.0, 2.0, 3.0];
+    batch.weight = vec![0.8, 1.0, 1.5, 2.0];
+    Fixture {
+        parameters: fill(denoiser.len(), 1),
+        critic_parameters: fill(critic.len(), 2),
+        dual_parameters: fill(dual.len(), 3),
+        actor: Actor { denoiser, schedule: VpSchedule::new(STEPS), policy_gradient, eta: 0.7 },
+        critic,
+        dual,
+        batch,
+        cloning: DMatrix::from_vec(2, SAMPLES, fill(2 * SAMPLES, 13)),
+    }
+}
+
+fn draw(stage: usize, sample: usize, out: &mut [f64]) {
+    out.copy_from_slice(&fill(out.len(), (100 + 10 * stage + sample) as u32));
+}
+
+impl Fixture {
+    fn backward(&self, parameters: &[f64]) -> (ActorLoss, Vec<f64>, ActorTape<f64>) {
+        let mut tape = self.actor.tape(&self.critic, &self.dual, SAMPLES);
+        let mut gradient = vec![0.0; parameters.len()];
+        let mut dual_gradient = vec![0.0; self.dual_parameters.len()];
+        let judges =
+            Judges { critic: (&self.critic, &self.critic_parameters), dual: (&self.dual, &self.dual_parameters) };
+        let noise = ActorNoise { levels: &LEVELS, cloning: &self.cloning, chain: &draw };
+        let loss = self.actor.backward(
+            parameters,
+            judges,
+            (&self.batch, SAMPLES),
+            &noise,
+            &mut tape,
+            (&mut gradient, &mut dual_gradient),
+        );
+        (loss, gradient, tape)
+    }
+
+    fn check(&self) {
+        let (_, gradient, tape) = self.backward(&self.parameters);
+        let clipped = tape.action.iter().filter(|action| action.abs() == 1.0).count();
+        assert!(clipped > 0 && clipped < 2 * SAMPLES, "the clip must be met and missed: {clipped}");
+        assert_gradient(&self.parameters, &gradient, |parameters| {
+            let (loss, ..) = self.backward(parameters);
+            (loss.cloning - self.actor.eta * loss.reward + loss.penalty) / SAMPLES as f64
+        });
+    }
+}
+
+#[test]
+fn the_gradient_through_the_full_chain_and_its_clips_is_that_of_finite_differences() {
+    fixture(PolicyGradient::Full).check();
+}
+
+#[test]
+fn the_one_step_gradient_is_that_of_finite_differences() {
+    fixture(PolicyGradient::OneStep).check();
+}
+
+#[test]
+fn a_sample_weight_scales_its_cloning_loss() {
+    let mut f = fixture(PolicyGradient::OneStep);
+    f.batch.weight = vec![1.0, 0.0, 0.0, 0.0];
+    let (one, ..) = f.backward(&f.parameters);
+    f.batch.weight = vec![2.0, 0.0, 0.0, 0.0];
+    let (two, ..) = f.backward(&f.parameters);
+    assert!(one.cloning > 0.0);
+    assert!((two.cloning - 2.0 * one.cloning).abs() < 1e-12);
+}
+
+/// Mean and variance at the end of a chain whose network is the exact score of
+/// `N(0.2, 0.04)`: every step is linear in the noise, so they follow exactly.
+fn moments_with_the_exact_score(sampler: Sampler, steps: usize) -> (f64, f64) {
+    let (target_mean, target_variance) = (0.2, 0.04);
+    let schedule = VpSchedule::new(steps);
+    schedule.chain(sampler, steps).fold((0.0, 1.0), |(mean, variance), step| {
+        let alpha_bar = schedule.alpha_bar(step.n);
+        // E[x0 | a] = mu + gain (a - sqrt(abar) mu)
+        let gain = alpha_bar.sqrt() * target_variance / (alpha_bar * target_variance + 1.0 - alpha_bar);
+        let slope = step.to_x0 * gain + step.to_action;
+        let shift = step.to_x0 * target_mean * (1.0 - gain * alpha_bar.sqrt());
+        (slope * mean + shift, slope * slope * variance + step.sigma * step.sigma)
+    })
+}
+
+/// The mean is met at any length, up to the 0.3 % of the action that is left at
+/// the start; the variance is met as the steps become fine, at first order.
+#[test]
+fn with_the_exact_score_a_chain_reproduces_mean_and_variance() {
+    for sampler in [Sampler::Ddpm, Sampler::Ddim] {
+        let errors = [20, 80, 320, 1280].map(|steps| {
+            let (mean, variance) = moments_with_the_exact_score(sampler, steps);
+            assert!((mean - 0.2).abs() < 0.2 * 0.02, "{sampler:?} {steps}: mean {mean}");
+            (variance - 0.04).abs()
+        });
+        assert!(errors.windows(2).all(|pair| pair[1] < 0.5 * pair[0]), "{sampler:?}: {errors:?}");
+        assert!(errors[3] < 0.001, "{sampler:?}: {errors:?}");
+    }
+}

@@ -1,0 +1,30 @@
+//! Recorded data in the DSRL layout: read, checked, counted, and made ready for training.
+//!
+//! ```text
+//! file --hdf5--> Recording --dataset--> Dataset --stats--> Table 1
+//!      \--check--> every fault and warning
+//! ```
+//!
+//! Bytes are checked once: whatever a [`Dataset`] holds is finite, costs are at
+//! least 0, actions lie in `[-1, 1]`, and every trajectory has an end.
+//!
+//! Words: a *row* or *transition* is one control step; a *trajectory* is an
+//! episode from its first row to the row with the end mark; *kappa* is the cost
+//! still to come in it.
+
+mod check;
+mod dataset;
+mod error;
+mod hdf5;
+mod key;
+mod moments;
+mod recording;
+mod stats;
+
+pub use check::{Report, Warning, check};
+pub use dataset::{Dataset, Trajectory};
+pub use error::{DataError, Fault};
+pub use key::Key;
+pub use moments::StateMoments;
+pub use recording::Recording;
+pub use stats::{Stats, feasible_mass};

@@ -1,0 +1,111 @@
+//! The networks of a run: their layouts, their numbers, their optimisers.
+
+use armor_core::noise::{Noise, uniform};
+use armor_core::schedule::{ChainStep, VpSchedule};
+use serde::{Deserialize, Serialize};
+
+use crate::actor::Actor;
+use crate::actor::denoiser::{Denoiser, Widths};
+use crate::config::Config;
+use crate::critic::Critic;
+use crate::dual::Dual;
+use crate::nn::{Adam, Scalar};
+use crate::stream;
+
+/// Layouts and fixed settings of the networks.
+#[derive(Clone, Debug)]
+pub struct Model {
+    /// The diffusion actor.
+    pub actor: Actor,
+    /// The multi-task critic.
+    pub critic: Critic,
+    /// The dual variable.
+    pub dual: Dual,
+    /// Chain that samples the next action of the targets.
+    pub target_chain: Vec<ChainStep<f64>>,
+    /// Discounts of reward, long-term and short-term cost.
+    pub discounts: [f64; 3],
+}
+
+/// The numbers of all networks, each a flat vector.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(bound = "")]
+pub struct Parameters<T: Scalar> {
+    /// Denoiser, phi.
+    pub actor: Vec<T>,
+    /// Critic, theta.
+    pub critic: Vec<T>,
+    /// Target critic, theta minus.
+    pub target: Vec<T>,
+    /// Dual network.
+    pub dual: Vec<T>,
+}
+
+/// The optimisers of the networks that learn by gradients.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(bound = "")]
+pub struct Optimisers<T: Scalar> {
+    /// Of the actor.
+    pub actor: Adam<T>,
+    /// Of the critic.
+    pub critic: Adam<T>,
+    /// Of the dual network.
+    pub dual: Adam<T>,
+}
+
+impl Model {
+    /// The networks of a configuration for data with the given dimensions.
+    pub fn new(config: &Config, state: usize, action: usize) -> Self {
+        let widths = Widths {
+            state,
+            action,
+            hidden: config.hidden,
+            kappa_hidden: config.kappa_hidden,
+            kappa_embedding: config.kappa_embedding,
+            time_code: config.time_code,
+            time_hidden: config.time_hidden,
+            time_embedding: config.time_embedding,
+            steps: config.diffusion_steps,
+        };
+        let schedule = VpSchedule::new(config.diffusion_steps);
+        Self {
+            actor: Actor {
+                denoiser: Denoiser::new(widths, config.kappa_scale),
+                schedule,
+                policy_gradient: config.policy_gradient,
+                eta: config.eta,
+            },
+            critic: Critic::new(state, action, config.trunk, config.head, config.kappa_scale),
+            dual: Dual::new(config.dual_hidden, config.kappa_scale),
+            target_chain: schedule.chain(config.target_sampler, config.target_steps).collect(),
+            discounts: [config.reward_discount, config.long_cost_discount, config.short_cost_discount],
+        }
+    }
+
+    /// Fresh numbers from a seed; the target critic starts as a copy of the critic.
+    pub fn initialise<T: Scalar>(&self, noise: Noise) -> Parameters<T> {
+        let draws = |network: u64| {
+            (0..)
+                .flat_map(move |block| noise.words(stream::INITIALISE, network, block))
+                .map(|word| f64::from(uniform(word)))
+        };
+        let mut actor = vec![T::zero(); self.actor.denoiser.len()];
+        let mut critic = vec![T::zero(); self.critic.len()];
+        let mut dual = vec![T::zero(); self.dual.len()];
+        self.actor.denoiser.initialise(&mut actor, &mut draws(0));
+        self.critic.initialise(&mut critic, &mut draws(1));
+        self.dual.initialise(&mut dual, &mut draws(2));
+        Parameters { actor, target: critic.clone(), critic, dual }
+    }
+}
+
+impl<T: Scalar> Optimisers<T> {
+    /// Fresh moments at the configured learning rates.
+    pub fn new(config: &Config, parameters: &Parameters<T>) -> Self {
+        Self {
+            actor: Adam::new(parameters.actor.len(), config.actor_rate),
+            critic: Adam::new(parameters.critic.len(), config.critic_rate),
+            dual: Adam::new(parameters.dual.len(), config.dual_rate),
+        }
+    }
+}

@@ -1,0 +1,85 @@
+//! A fully connected layer as a view into a parameter vector.
+
+use std::ops::Range;
+
+use nalgebra::DMatrix;
+
+use super::Scalar;
+use super::product::{Operand, Update, product};
+
+/// Where a layer lies in the parameters of its network.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Linear {
+    /// Entries of its input.
+    pub inputs: usize,
+    /// Entries of its output.
+    pub outputs: usize,
+    /// Index of its first weight.
+    pub offset: usize,
+}
+
+impl Linear {
+    /// Numbers of the layer: weights, then bias.
+    pub const fn len(&self) -> usize {
+        self.inputs * self.outputs + self.outputs
+    }
+
+    /// Index one past the layer's last number.
+    pub const fn end(&self) -> usize {
+        self.offset + self.len()
+    }
+
+    /// Weights, `outputs x inputs`.
+    pub fn weights<'a, T: Scalar>(&self, parameters: &'a [T]) -> Operand<'a, T> {
+        self.block(parameters, 0..self.inputs)
+    }
+
+    /// The weights of some of the inputs, `outputs x range`.
+    pub fn block<'a, T: Scalar>(&self, parameters: &'a [T], inputs: Range<usize>) -> Operand<'a, T> {
+        let columns = inputs.len();
+        Operand::new(&parameters[self.range(inputs)], self.outputs, columns)
+    }
+
+    /// Where the weights of some of the inputs lie.
+    const fn range(&self, inputs: Range<usize>) -> Range<usize> {
+        self.offset + inputs.start * self.outputs..self.offset + inputs.end * self.outputs
+    }
+
+    /// Bias `[outputs]`.
+    pub fn bias<'a, T: Scalar>(&self, parameters: &'a [T]) -> &'a [T] {
+        &parameters[self.end() - self.outputs..self.end()]
+    }
+
+    /// As [`Linear::bias`], to write a gradient.
+    pub fn bias_mut<'a, T: Scalar>(&self, parameters: &'a mut [T]) -> &'a mut [T] {
+        &mut parameters[self.end() - self.outputs..self.end()]
+    }
+
+    /// Adds the gradient of weights and bias: `delta x^T` and the row sums of `delta`.
+    pub fn add_gradient<T: Scalar>(&self, gradient: &mut [T], delta: &DMatrix<T>, input: &DMatrix<T>) {
+        self.add_block_gradient(gradient, 0..self.inputs, delta, input);
+        self.add_bias_gradient(gradient, delta);
+    }
+
+    /// Adds the gradient of the weights of some of the inputs: `delta x^T`.
+    pub fn add_block_gradient<T: Scalar>(
+        &self,
+        gradient: &mut [T],
+        inputs: Range<usize>,
+        delta: &DMatrix<T>,
+        input: &DMatrix<T>,
+    ) {
+        let block = &mut gradient[self.range(inputs)];
+        product(block, delta.into(), Operand::from(input).transposed(), Update::Add);
+    }
+
+    /// Adds the gradient of the bias: the row sums of `delta`.
+    pub fn add_bias_gradient<T: Scalar>(&self, gradient: &mut [T], delta: &DMatrix<T>) {
+        let bias = self.bias_mut(gradient);
+        for column in delta.as_slice().chunks_exact(bias.len()) {
+            for (sum, &delta) in bias.iter_mut().zip(column) {
+                *sum += delta;
+            }
+        }
+    }
+}

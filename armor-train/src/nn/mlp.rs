@@ -1,0 +1,198 @@
+//! A stack of fully connected layers, forward and backward.
+
+use nalgebra::DMatrix;
+
+use super::product::{Update, product};
+use super::{Activation, Linear, Scalar};
+
+/// Layout of a stack of layers within a parameter vector.
+#[derive(Clone, Debug)]
+pub struct Mlp {
+    layers: Vec<Linear>,
+    activation: Activation,
+    /// Whether the last layer is followed by the activation as well.
+    activate_output: bool,
+}
+
+/// What a forward pass leaves behind for the backward pass; reused from step to step.
+#[derive(Clone, Debug)]
+pub struct Tape<T: Scalar> {
+    /// Output of each layer.
+    values: Vec<DMatrix<T>>,
+    /// Derivative of each layer's activation.
+    slopes: Vec<DMatrix<T>>,
+    /// Gradient with respect to each layer's sum.
+    deltas: Vec<DMatrix<T>>,
+}
+
+impl<T: Scalar> Tape<T> {
+    /// The output of the last forward pass, `outputs x samples`.
+    pub fn output(&self) -> &DMatrix<T> {
+        self.values.last().expect("an Mlp has a layer")
+    }
+
+    /// Where the gradient with respect to the output is written before a backward pass.
+    pub fn output_gradient(&mut self) -> &mut DMatrix<T> {
+        self.deltas.last_mut().expect("an Mlp has a layer")
+    }
+}
+
+impl Mlp {
+    /// A stack through the given widths, its numbers from index `offset` on.
+    pub fn new(widths: &[usize], offset: usize, activation: Activation, activate_output: bool) -> Self {
+        let mut layers: Vec<Linear> = Vec::new();
+        for pair in widths.windows(2) {
+            let offset = layers.last().map_or(offset, Linear::end);
+            layers.push(Linear { inputs: pair[0], outputs: pair[1], offset });
+        }
+        Self { layers, activation, activate_output }
+    }
+
+    /// The layers, first to last.
+    pub fn layers(&self) -> &[Linear] {
+        &self.layers
+    }
+
+    /// Index one past the last number.
+    pub fn end(&self) -> usize {
+        self.layers.last().map_or(0, Linear::end)
+    }
+
+    /// Room for passes over `samples` columns.
+    pub fn tape<T: Scalar>(&self, samples: usize) -> Tape<T> {
+        let room = || self.layers.iter().map(|layer| DMatrix::zeros(layer.outputs, samples)).collect();
+        Tape { values: room(), slopes: room(), deltas: room() }
+    }
+
+    fn is_activated(&self, layer: usize) -> bool {
+        self.activate_output || layer + 1 < self.layers.len()
+    }
+
+    /// Runs the stack on `input`, `inputs x samples`; with `slopes`, a backward pass may follow.
+    pub fn forward<T: Scalar>(&self, parameters: &[T], input: &DMatrix<T>, tape: &mut Tape<T>, slopes: bool) {
+        for (index, layer) in self.layers.iter().enumerate() {
+            let (before, rest) = tape.values.split_at_mut(index);
+            let input = before.last().unwrap_or(input);
+            let values = &mut rest[0];
+            product(values.as_mut_slice(), layer.weights(parameters), input.into(), Update::Replace);
+            let bias = layer.bias(parameters);
+            if self.is_activated(index) {
+                self.activation.apply(values, slopes.then_some(&mut tape.slopes[index]), bias);
+            } else {
+                add_bias(values, bias);
+            }
+        }
+    }
+
+    /// Back-propagates [`Tape::output_gradient`] through the last forward pass.
+    ///
+    /// Adds to `gradient` (as long as the parameters) where it is given, and
+    /// writes the gradient with respect to the input where `input_gradient` is given.
+    pub fn backward<T: Scalar>(
+        &self,
+        parameters: &[T],
+        input: &DMatrix<T>,
+        tape: &mut Tape<T>,
+        mut gradient: Option<&mut [T]>,
+        input_gradient: Option<&mut DMatrix<T>>,
+    ) {
+        for (index, layer) in self.layers.iter().enumerate().rev() {
+            if self.is_activated(index) {
+                tape.deltas[index].component_mul_assign(&tape.slopes[index]);
+            }
+            let (before, rest) = tape.deltas.split_at_mut(index);
+            let delta = &rest[0];
+            if let Some(gradient) = gradient.as_deref_mut() {
+                let input = if index == 0 { input } else { &tape.values[index - 1] };
+                layer.add_gradient(gradient, delta, input);
+            }
+            if let Some(below) = before.last_mut() {
+                product(below.as_mut_slice(), layer.weights(parameters).transposed(), delta.into(), Update::Replace);
+            }
+        }
+        if let (Some(input_gradient), Some(first)) = (input_gradient, self.layers.first()) {
+            let weights = first.weights(parameters).transposed();
+            product(input_gradient.as_mut_slice(), weights, (&tape.deltas[0]).into(), Update::Replace);
+        }
+    }
+
+    /// PyTorch's default: weights and biases uniform within `1 / sqrt(inputs)`, from draws in `[0, 1)`.
+    pub fn initialise<T: Scalar>(&self, parameters: &mut [T], draws: &mut impl Iterator<Item = f64>) {
+        for layer in &self.layers {
+            layer.initialise(parameters, draws);
+        }
+    }
+}
+
+impl Linear {
+    /// As [`Mlp::initialise`], for one layer.
+    pub fn initialise<T: Scalar>(&self, parameters: &mut [T], draws: &mut impl Iterator<Item = f64>) {
+        let bound = 1.0 / (self.inputs as f64).sqrt();
+        for (parameter, draw) in parameters[self.offset..self.end()].iter_mut().zip(draws) {
+            *parameter = T::of(bound * (2.0 * draw - 1.0));
+        }
+    }
+}
+
+fn add_bias<T: Scalar>(values: &mut DMatrix<T>, bias: &[T]) {
+    for column in values.as_mut_slice().chunks_exact_mut(bias.len()) {
+        for (value, &bias) in column.iter_mut().zip(bias) {
+            *value += bias;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{assert_gradient, fill};
+
+    fn check(activation: Activation, activate_output: bool) {
+        let mlp = Mlp::new(&[3, 8, 7, 2], 0, activation, activate_output);
+        let parameters: Vec<f64> = fill(mlp.end(), 1);
+        let input = DMatrix::from_vec(3, 6, fill(18, 2));
+        let seed = DMatrix::from_vec(2, 6, fill(12, 3));
+        let mut tape = mlp.tape(6);
+
+        let loss = |parameters: &[f64], input: &DMatrix<f64>| {
+            let mut tape = mlp.tape(6);
+            mlp.forward(parameters, input, &mut tape, false);
+            tape.output().dot(&seed)
+        };
+        let mut gradient = vec![0.0; mlp.end()];
+        let mut input_gradient = DMatrix::zeros(3, 6);
+        mlp.forward(&parameters, &input, &mut tape, true);
+        tape.output_gradient().copy_from(&seed);
+        mlp.backward(&parameters, &input, &mut tape, Some(&mut gradient), Some(&mut input_gradient));
+
+        assert_gradient(&parameters, &gradient, |parameters| loss(parameters, &input));
+        assert_gradient(input.as_slice(), input_gradient.as_slice(), |values| {
+            loss(&parameters, &DMatrix::from_column_slice(3, 6, values))
+        });
+    }
+
+    #[test]
+    fn gradients_are_those_of_finite_differences() {
+        check(Activation::Mish, false);
+        check(Activation::Mish, true);
+        check(Activation::Relu, false);
+    }
+
+    #[test]
+    fn a_second_backward_pass_adds_to_the_gradient() {
+        let mlp = Mlp::new(&[2, 3, 1], 0, Activation::Mish, false);
+        let parameters: Vec<f64> = fill(mlp.end(), 1);
+        let input = DMatrix::from_vec(2, 4, fill(8, 2));
+        let mut tape = mlp.tape(4);
+        let mut gradient = vec![0.0; mlp.end()];
+        mlp.forward(&parameters, &input, &mut tape, true);
+        tape.output_gradient().fill(1.0);
+        mlp.backward(&parameters, &input, &mut tape, Some(&mut gradient), None);
+        let once = gradient.clone();
+        tape.output_gradient().fill(1.0);
+        mlp.backward(&parameters, &input, &mut tape, Some(&mut gradient), None);
+        for (twice, once) in gradient.iter().zip(&once) {
+            assert!((twice - 2.0 * once).abs() < 1e-12);
+        }
+    }
+}

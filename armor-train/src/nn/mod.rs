@@ -1,0 +1,53 @@
+//! Fully connected networks, forward and backward, over flat parameter vectors.
+//!
+//! A network is a layout ([`Mlp`]) and a vector of numbers. Optimiser, soft
+//! update, gradient surgery and checkpoint see only the vector; a layer's
+//! weights are a view into it, `outputs x inputs`, column by column, followed by
+//! the bias. In every matrix a column is a sample, so a share of a batch is a
+//! contiguous piece. Generic over the scalar: training is f32, gradient checks
+//! are f64.
+
+mod activation;
+mod adam;
+mod linear;
+mod mlp;
+mod product;
+mod scalar;
+mod sinusoid;
+
+pub use activation::Activation;
+pub use adam::Adam;
+pub use linear::Linear;
+pub use mlp::{Mlp, Tape};
+pub use product::{Operand, Update, product};
+pub use scalar::Scalar;
+pub use sinusoid::sinusoidal_code;
+
+/// `target <- rate * online + (1 - rate) * target` (Appendix B, tau).
+pub fn soft_update<T: Scalar>(target: &mut [T], online: &[T], rate: T) {
+    for (target, &online) in target.iter_mut().zip(online) {
+        *target += rate * (online - *target);
+    }
+}
+
+/// Adds `part` to `sum`, entry by entry.
+pub fn accumulate<T: Scalar>(sum: &mut [T], part: &[T]) {
+    for (sum, &part) in sum.iter_mut().zip(part) {
+        *sum += part;
+    }
+}
+
+/// The inner product of two parameter-sized vectors, in f64.
+pub fn dot<T: Scalar>(a: &[T], b: &[T]) -> f64 {
+    // Eight running sums let the loop vectorise; their order is fixed.
+    let mut sums = [0.0; 8];
+    let (a_chunks, a_rest) = a.as_chunks::<8>();
+    let (b_chunks, b_rest) = b.as_chunks::<8>();
+    for (a, b) in a_chunks.iter().zip(b_chunks) {
+        for ((sum, a), b) in sums.iter_mut().zip(a).zip(b) {
+            *sum += a.to_f64() * b.to_f64();
+        }
+    }
+    let rest: f64 = a_rest.iter().zip(b_rest).map(|(a, b)| a.to_f64() * b.to_f64()).sum();
+    sums.iter().sum::<f64>() + rest
+}

@@ -1,0 +1,101 @@
+//! The number type of a network.
+
+use nalgebra::RealField;
+use serde::{Serialize, de::DeserializeOwned};
+
+/// f32 to train, f64 to check.
+pub trait Scalar: RealField + Copy + Serialize + DeserializeOwned + 'static {
+    /// `mish(x)` and its derivative.
+    fn mish_with_derivative(self) -> (Self, Self);
+    /// `value <- mish(value + bias)`, entry by entry.
+    fn mish_column(values: &mut [Self], bias: &[Self]) {
+        for (value, &bias) in values.iter_mut().zip(bias) {
+            *value = (*value + bias).mish_with_derivative().0;
+        }
+    }
+    /// As [`Scalar::mish_column`], and writes the derivative to `slopes`.
+    fn mish_column_with_slopes(values: &mut [Self], slopes: &mut [Self], bias: &[Self]) {
+        for ((value, slope), &bias) in values.iter_mut().zip(slopes).zip(bias) {
+            (*value, *slope) = (*value + bias).mish_with_derivative();
+        }
+    }
+    /// The nearest value of this type.
+    fn of(value: f64) -> Self;
+    /// The value in double precision.
+    fn to_f64(self) -> f64;
+    /// `out = a b + beta out` with dimensions `[m, k, n]`; each matrix with its row and column strides.
+    ///
+    /// # Safety
+    /// Every element that dimensions and strides reach must lie within the matrix's allocation.
+    #[allow(unsafe_code)]
+    unsafe fn gemm(
+        dims: [usize; 3],
+        a: (*const Self, [isize; 2]),
+        b: (*const Self, [isize; 2]),
+        beta: Self,
+        out: (*mut Self, [isize; 2]),
+    );
+    /// The value of a recorded number.
+    fn of_f32(value: f32) -> Self {
+        Self::of(f64::from(value))
+    }
+}
+
+impl Scalar for f32 {
+    #[inline(always)]
+    fn mish_with_derivative(self) -> (Self, Self) {
+        armor_core::mish::mish_with_derivative(self)
+    }
+    #[inline(always)]
+    fn of(value: f64) -> Self {
+        value as f32
+    }
+    #[inline(always)]
+    fn to_f64(self) -> f64 {
+        f64::from(self)
+    }
+    #[allow(unsafe_code)]
+    unsafe fn gemm(
+        [m, k, n]: [usize; 3],
+        (a, [a_row, a_column]): (*const Self, [isize; 2]),
+        (b, [b_row, b_column]): (*const Self, [isize; 2]),
+        beta: Self,
+        (out, [out_row, out_column]): (*mut Self, [isize; 2]),
+    ) {
+        // SAFETY: the caller's promise is the one that `matrixmultiply` asks for.
+        unsafe {
+            matrixmultiply::sgemm(m, k, n, 1.0, a, a_row, a_column, b, b_row, b_column, beta, out, out_row, out_column);
+        }
+    }
+}
+
+impl Scalar for f64 {
+    #[inline(always)]
+    fn mish_with_derivative(self) -> (Self, Self) {
+        let e = self.min(40.0).exp();
+        let n = e * (e + 2.0);
+        let tanh = n / (n + 2.0);
+        (self * tanh, tanh + self * 4.0 * (e / (n + 2.0)) * ((e + 1.0) / (n + 2.0)))
+    }
+    #[inline(always)]
+    fn of(value: f64) -> Self {
+        value
+    }
+    #[inline(always)]
+    fn to_f64(self) -> f64 {
+        self
+    }
+    #[allow(unsafe_code)]
+    unsafe fn gemm(
+        [m, k, n]: [usize; 3],
+        (a, [a_row, a_column]): (*const Self, [isize; 2]),
+        (b, [b_row, b_column]): (*const Self, [isize; 2]),
+        beta: Self,
+        (out, [out_row, out_column]): (*mut Self, [isize; 2]),
+    ) {
+        // SAFETY: the caller's promise is the one that `matrixmultiply` asks for.
+        unsafe {
+            matrixmultiply::dgemm(m, k, n, 1.0, a, a_row, a_column, b, b_row, b_column, beta, out, out_row, out_column);
+        }
+    }
+}

@@ -1,0 +1,85 @@
+//! Multi-scale reweighting (section 3.3): which recorded transitions the actor
+//! is to imitate most.
+
+pub mod counterfactual;
+pub mod trajectory;
+
+use crate::data::Dataset;
+
+/// Guards the division by a mean of zero (Eqs. 9 and 10).
+pub const EPSILON: f64 = 1e-6;
+
+/// When the weights are active and refreshed (Table 2).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Refresh {
+    /// Training steps before the first refresh; all weights are 1 until then.
+    pub warmup: u64,
+    /// Training steps between refreshes.
+    pub interval: u64,
+}
+
+impl Refresh {
+    /// Whether the weights are refreshed before training step `step`, counted from 0.
+    pub const fn is_due(&self, step: u64) -> bool {
+        step >= self.warmup && (step - self.warmup).is_multiple_of(self.interval)
+    }
+}
+
+/// The weights of all transitions.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Weights {
+    /// `w_traj` (Eq. 6).
+    pub trajectory: Vec<f32>,
+    /// `w_cf` (Eq. 9), smoothed over refreshes.
+    pub counterfactual: Vec<f32>,
+    /// `w` (Eq. 10); all 1 before the first refresh.
+    pub combined: Vec<f32>,
+}
+
+impl Weights {
+    /// All scales off.
+    pub fn ones(data: &Dataset, limit: f32, beta: f64) -> Self {
+        let ones = vec![1.0; data.len()];
+        Self { trajectory: trajectory::weights(data, limit, beta), counterfactual: ones.clone(), combined: ones }
+    }
+
+    /// Eq. 10 over the whole data: `w = clip(w_traj w_cf / (E[w_traj w_cf] + eps), w_min, w_max)`.
+    pub fn combine(&mut self, [low, high]: [f64; 2]) {
+        let product = || self.trajectory.iter().zip(&self.counterfactual).map(|(&a, &b)| f64::from(a) * f64::from(b));
+        let mean = product().sum::<f64>() / self.trajectory.len() as f64;
+        self.combined = product().map(|weight| (weight / (mean + EPSILON)).clamp(low, high) as f32).collect();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn weights(trajectory: Vec<f32>, counterfactual: Vec<f32>) -> Weights {
+        Weights { combined: vec![1.0; trajectory.len()], trajectory, counterfactual }
+    }
+
+    #[test]
+    fn the_papers_settings_refresh_thirty_six_times() {
+        let refresh = Refresh { warmup: 20_000, interval: 5_000 };
+        let due: Vec<u64> = (0..200_000).filter(|&step| refresh.is_due(step)).collect();
+        assert_eq!((due.len(), due[0], due[35]), (36, 20_000, 195_000));
+    }
+
+    #[test]
+    fn weights_have_mean_one_before_the_clip() {
+        let mut weights = weights(vec![1.5, 1.0, 1.0, 1.0], vec![1.0, 1.2, 1.0, 2.0]);
+        weights.combine([0.0, 10.0]);
+        let mean = weights.combined.iter().sum::<f32>() / 4.0;
+        assert!((mean - 1.0).abs() < 1e-5);
+        let ratio = weights.combined[3] / weights.combined[2];
+        assert!((ratio - 2.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn weights_are_clipped() {
+        let mut weights = weights(vec![1.0; 5], vec![1.0, 1.0, 1.0, 1.0, 20.0]);
+        weights.combine([0.8, 2.0]);
+        assert_eq!(weights.combined, [0.8, 0.8, 0.8, 0.8, 2.0]);
+    }
+}

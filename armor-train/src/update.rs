@@ -1,0 +1,195 @@
+//! The updates of one training step, over shares of the batch (sections 3.2 and 3.4).
+//!
+//! Each [`Worker`] holds a fixed share of the batch, whatever the number of
+//! threads, and gradients are added in the order of the workers: results do not
+//! depend on the number of threads.
+
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+
+use crate::actor::chain::{Chain, Draw};
+use crate::actor::denoiser::Context;
+use crate::actor::{ActorLoss, ActorNoise, ActorTape, Judges};
+use crate::batch::Batch;
+use crate::critic::{CriticTape, Task, bellman_target};
+use crate::model::{Model, Optimisers, Parameters};
+use crate::nn::{Scalar, accumulate, soft_update};
+use crate::pcgrad;
+
+/// A share of the batch, and room for everything that is computed from it.
+#[derive(Clone, Debug)]
+pub struct Worker<T: Scalar> {
+    /// Place of the share's first sample in the batch.
+    pub first: usize,
+    /// The share.
+    pub batch: Batch<T>,
+    /// Noise level of each sample for behaviour cloning.
+    pub levels: Vec<usize>,
+    /// Noise of behaviour cloning, `A x B`.
+    pub cloning: DMatrix<T>,
+    next_context: Context<T>,
+    next_chain: Chain<T>,
+    target_tape: CriticTape<T>,
+    critic_tape: CriticTape<T>,
+    targets: Vec<T>,
+    /// Gradient of the heads; its trunk part stays zero.
+    critic_gradient: Vec<T>,
+    trunk_gradients: [Vec<T>; 3],
+    critic_losses: [f64; 3],
+    actor_tape: ActorTape<T>,
+    actor_gradient: Vec<T>,
+    dual_gradient: Vec<T>,
+    actor_loss: ActorLoss,
+}
+
+/// What the critic's update measured, means over the batch.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct CriticMetrics {
+    /// Losses of reward, long-term and short-term cost, summed over the twins (Eq. 4).
+    pub losses: [f64; 3],
+    /// Pairs of trunk gradients in conflict, 0 to 3 (Table A1).
+    pub conflicts: usize,
+}
+
+impl<T: Scalar> Worker<T> {
+    /// Room for a share of `samples` samples from place `first` on.
+    pub fn new(model: &Model, first: usize, samples: usize) -> Self {
+        let denoiser = &model.actor.denoiser;
+        let (state, action) = (denoiser.widths().state, denoiser.widths().action);
+        Self {
+            first,
+            batch: Batch::zeros(state, action, samples),
+            levels: vec![1; samples],
+            cloning: DMatrix::zeros(action, samples),
+            next_context: denoiser.context(samples),
+            next_chain: Chain::new(denoiser, model.target_chain.clone(), samples, false),
+            target_tape: model.critic.tape(samples),
+            critic_tape: model.critic.tape(samples),
+            targets: Vec::with_capacity(samples),
+            critic_gradient: vec![T::zero(); model.critic.len()],
+            trunk_gradients: [(); 3].map(|()| vec![T::zero(); model.critic.trunk_len()]),
+            critic_losses: [0.0; 3],
+            actor_tape: model.actor.tape(&model.critic, &model.dual, samples),
+            actor_gradient: vec![T::zero(); denoiser.len()],
+            dual_gradient: vec![T::zero(); model.dual.len()],
+            actor_loss: ActorLoss::default(),
+        }
+    }
+
+    /// The actions that the actor's last update judged, `A x B`.
+    pub const fn policy_action(&self) -> &DMatrix<T> {
+        &self.actor_tape.action
+    }
+
+    /// `Q_cL - kappa` at those actions `[B]`.
+    pub fn violation(&self) -> &[T] {
+        &self.actor_tape.violation
+    }
+
+    /// Eqs. 3 and 4: targets, losses and the gradient of each task.
+    fn judge(&mut self, model: &Model, parameters: &Parameters<T>, batch_len: usize, draw: &Draw<'_, T>) {
+        let Self { batch, next_context, next_chain, target_tape, critic_tape, targets, .. } = self;
+        let (first, denoiser, critic) = (self.first, &model.actor.denoiser, &model.critic);
+        denoiser.prepare(&parameters.actor, &batch.next_state, &batch.next_kappa, next_context);
+        let draw = |stage: usize, sample: usize, out: &mut [T]| draw(stage, first + sample, out);
+        next_chain.run(denoiser, &parameters.actor, next_context, &draw);
+        let next = (&batch.next_state, &batch.next_kappa[..], &next_chain.action);
+        critic.forward(&parameters.target, &Task::ALL, next, target_tape, false);
+        let recorded = (&batch.state, &batch.kappa[..], &batch.action);
+        critic.forward(&parameters.critic, &Task::ALL, recorded, critic_tape, true);
+
+        self.critic_gradient.fill(T::zero());
+        for (index, task) in Task::ALL.into_iter().enumerate() {
+            let signal = if task == Task::Reward { &batch.reward } else { &batch.cost };
+            let next_value = target_tape.pessimistic(task);
+            bellman_target(signal, &batch.alive, model.discounts[index], next_value, targets);
+            let trunk_gradient = &mut self.trunk_gradients[index];
+            trunk_gradient.fill(T::zero());
+            let gradients = (&mut self.critic_gradient[..], &mut trunk_gradient[..]);
+            self.critic_losses[index] =
+                critic.backward_td(&parameters.critic, task, targets, batch_len, critic_tape, gradients);
+        }
+    }
+
+    /// Eqs. 13, 15 and 16: the gradients of actor and dual.
+    fn improve(&mut self, model: &Model, parameters: &Parameters<T>, batch_len: usize, draw: &Draw<'_, T>) {
+        let first = self.first;
+        let draw = |stage: usize, sample: usize, out: &mut [T]| draw(stage, first + sample, out);
+        self.actor_gradient.fill(T::zero());
+        self.dual_gradient.fill(T::zero());
+        let judges = Judges { critic: (&model.critic, &parameters.critic), dual: (&model.dual, &parameters.dual) };
+        let noise = ActorNoise { levels: &self.levels, cloning: &self.cloning, chain: &draw };
+        self.actor_loss = model.actor.backward(
+            &parameters.actor,
+            judges,
+            (&self.batch, batch_len),
+            &noise,
+            &mut self.actor_tape,
+            (&mut self.actor_gradient, &mut self.dual_gradient),
+        );
+    }
+}
+
+/// Updates the critic: Eqs. 3 and 4 in every share, Eq. 5 on the trunk, one step of Adam.
+///
+/// `draw` gives the noise of the next actions by stage and place in the batch,
+/// `orders` the order of the others for each task. Returns the gradient with the metrics.
+pub fn update_critic<T: Scalar>(
+    model: &Model,
+    parameters: &mut Parameters<T>,
+    optimisers: &mut Optimisers<T>,
+    workers: &mut [Worker<T>],
+    draw: &Draw<'_, T>,
+    orders: &[[usize; 2]; 3],
+) -> (CriticMetrics, Vec<T>) {
+    let batch_len = workers.iter().map(|worker| worker.batch.len()).sum();
+    let shared = &*parameters;
+    workers.par_iter_mut().for_each(|worker| worker.judge(model, shared, batch_len, draw));
+
+    let mut gradient = vec![T::zero(); model.critic.len()];
+    let mut trunk = [(); 3].map(|()| vec![T::zero(); model.critic.trunk_len()]);
+    let mut metrics = CriticMetrics::default();
+    for worker in workers {
+        accumulate(&mut gradient, &worker.critic_gradient);
+        for task in 0..3 {
+            accumulate(&mut trunk[task], &worker.trunk_gradients[task]);
+            metrics.losses[task] += worker.critic_losses[task] / batch_len as f64;
+        }
+    }
+    metrics.conflicts = pcgrad::project(&trunk, orders, &mut gradient[..model.critic.trunk_len()]);
+    optimisers.critic.descend(&mut parameters.critic, &gradient);
+    (metrics, gradient)
+}
+
+/// Updates actor and dual (Eqs. 15 and 16), one step of Adam each, judged by the live critic.
+///
+/// `draw` gives the noise of the policy's chain by stage and place in the
+/// batch. Returns the losses as means over the batch, and the gradients of actor and dual.
+pub fn update_actor<T: Scalar>(
+    model: &Model,
+    parameters: &mut Parameters<T>,
+    optimisers: &mut Optimisers<T>,
+    workers: &mut [Worker<T>],
+    draw: &Draw<'_, T>,
+) -> (ActorLoss, [Vec<T>; 2]) {
+    let batch_len = workers.iter().map(|worker| worker.batch.len()).sum();
+    let shared = &*parameters;
+    workers.par_iter_mut().for_each(|worker| worker.improve(model, shared, batch_len, draw));
+
+    let mut gradient = vec![T::zero(); parameters.actor.len()];
+    let mut dual_gradient = vec![T::zero(); parameters.dual.len()];
+    let mut sum = ActorLoss::default();
+    for worker in workers {
+        accumulate(&mut gradient, &worker.actor_gradient);
+        accumulate(&mut dual_gradient, &worker.dual_gradient);
+        sum = sum + worker.actor_loss;
+    }
+    optimisers.actor.descend(&mut parameters.actor, &gradient);
+    optimisers.dual.descend(&mut parameters.dual, &dual_gradient);
+    (sum * (1.0 / batch_len as f64), [gradient, dual_gradient])
+}
+
+/// Moves the target critic towards the critic (Appendix B).
+pub fn update_target<T: Scalar>(parameters: &mut Parameters<T>, rate: f64) {
+    soft_update(&mut parameters.target, &parameters.critic, T::of(rate));
+}

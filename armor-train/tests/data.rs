@@ -1,0 +1,27 @@
+//! Recorded data: the shipped file's numbers, every fault by a file that has
+//! it, damaged files, and what a data set makes of any recording.
+
+#[path = "data/damage.rs"]
+mod damage;
+#[path = "data/dataset.rs"]
+mod dataset;
+#[path = "data/faults.rs"]
+mod faults;
+#[path = "data/formats.rs"]
+mod formats;
+#[path = "data/shipped.rs"]
+mod shipped;
+#[path = "data/table.rs"]
+mod table;
+
+use std::path::{Path, PathBuf};
+
+/// A file of this folder's fixtures.
+fn fixture(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(name)
+}
+
+/// The recording that ships with the project.
+fn shipped_file() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../data/ball-run-bullet.hdf5")
+}

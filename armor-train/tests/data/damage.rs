@@ -1,0 +1,118 @@
+//! Damaged files: cut anywhere, bits flipped anywhere. Always a named fault or
+//! a sound recording, never a panic.
+
+use std::fs;
+use std::path::Path;
+
+use armor_core::noise::{Noise, below};
+use armor_train::data::{Fault, Recording};
+
+use crate::{fixture, shipped_file};
+
+/// Reads what a file with these bytes holds.
+fn read(folder: &Path, bytes: &[u8]) -> Result<Recording, Fault> {
+    let path = folder.join("damaged.hdf5");
+    fs::write(&path, bytes).unwrap();
+    Recording::read(&path).map_err(|error| error.fault)
+}
+
+#[track_caller]
+fn assert_named(bytes: usize, whole: usize, result: Result<Recording, Fault>) {
+    let (cut, expected) = (bytes as u64, whole as u64);
+    match result.unwrap_err() {
+        // The 8 bytes of the signature, the 96 of the superblock, the rest.
+        Fault::NotHdf5 { bytes } => assert!(bytes == cut && cut < 8),
+        Fault::Damaged { .. } => assert!((8..96).contains(&cut), "cut at {cut}"),
+        fault => assert_eq!(fault, Fault::Truncated { bytes: cut, expected }),
+    }
+}
+
+#[test]
+fn a_file_cut_anywhere_is_named_as_such() {
+    let folder = tempfile::tempdir().unwrap();
+    let small = fs::read(fixture("small.hdf5")).unwrap();
+    for bytes in 0..small.len() {
+        assert_named(bytes, small.len(), read(folder.path(), &small[..bytes]));
+    }
+
+    let shipped = fs::read(shipped_file()).unwrap();
+    let spread = (0..200).map(|cut| cut * shipped.len() / 200);
+    for bytes in spread.chain([1, 7, 8, 95, 96, 97, 2048, shipped.len() - 1]) {
+        assert_named(bytes, shipped.len(), read(folder.path(), &shipped[..bytes]));
+    }
+}
+
+/// The superblock's end-of-file address is at byte 40; set to the cut, the
+/// damage is left for the deeper structures to show.
+#[test]
+fn a_file_cut_behind_the_superblocks_back_is_damaged_or_whole() {
+    let folder = tempfile::tempdir().unwrap();
+    let small = fs::read(fixture("small.hdf5")).unwrap();
+    let whole = read(folder.path(), &small).unwrap();
+    let mut damaged = 0;
+    for bytes in 48..small.len() {
+        let mut cut = small[..bytes].to_vec();
+        cut[40..48].copy_from_slice(&(bytes as u64).to_le_bytes());
+        match read(folder.path(), &cut) {
+            // What was cut is space that no data set uses.
+            Ok(recording) => assert_eq!(Recording { sha256: whole.sha256, ..recording }, whole),
+            Err(fault) => {
+                assert!(matches!(fault, Fault::Damaged { .. }), "{fault}");
+                damaged += 1;
+            }
+        }
+    }
+    assert!(damaged > small.len() / 2);
+}
+
+/// Old HDF5 structures carry no checksum, so a flip may read as other data;
+/// what is read must still be sound.
+#[test]
+fn a_flipped_bit_is_a_named_fault_or_a_sound_recording() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut bytes = fs::read(fixture("small.hdf5")).unwrap();
+    let noise = Noise::new(0);
+    let mut faults = 0;
+    for position in 0..bytes.len() {
+        let bit = below(noise.words(0, position as u64, 0)[0], 8);
+        bytes[position] ^= 1 << bit;
+        match read(folder.path(), &bytes) {
+            Ok(recording) => assert_sound(&recording),
+            Err(_) => faults += 1,
+        }
+        bytes[position] ^= 1 << bit;
+    }
+    assert!(faults > 500, "{faults}");
+}
+
+#[test]
+fn many_overwritten_bytes_are_a_named_fault_or_a_sound_recording() {
+    let folder = tempfile::tempdir().unwrap();
+    let small = fs::read(fixture("small.hdf5")).unwrap();
+    for trial in 0..4000 {
+        let mut bytes = small.clone();
+        for block in 0..16 {
+            let [position, value, ..] = Noise::new(1).words(0, trial, block);
+            bytes[below(position, small.len() as u32) as usize] = value as u8;
+        }
+        if let Ok(recording) = read(folder.path(), &bytes) {
+            assert_sound(&recording);
+        }
+    }
+}
+
+/// The promises of a recording that was read without a fault.
+fn assert_sound(recording: &Recording) {
+    let rows = recording.rewards.len();
+    assert!(rows > 0);
+    assert_eq!(recording.observations.len(), rows * recording.state_dim);
+    assert_eq!(recording.next_observations.len(), rows * recording.state_dim);
+    assert_eq!(recording.actions.len(), rows * recording.action_dim);
+    for column in [&recording.observations, &recording.next_observations, &recording.rewards] {
+        assert!(column.iter().all(|value| value.is_finite()));
+    }
+    assert!(recording.actions.iter().all(|action| action.abs() <= 1.001));
+    assert!(recording.costs.iter().all(|cost| (0.0..=65536.0).contains(cost)));
+    assert_eq!((recording.costs.len(), recording.terminals.len(), recording.timeouts.len()), (rows, rows, rows));
+    assert!(recording.terminals.iter().chain(&recording.timeouts).any(|&end| end));
+}

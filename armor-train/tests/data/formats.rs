@@ -1,0 +1,70 @@
+//! The kinds of file that occur: what h5py writes, and every type and shape of a column.
+
+use armor_train::data::{Dataset, Recording};
+
+use crate::fixture;
+use crate::table::{ROWS, Table, Values};
+
+/// The values are the formulas of `small.py`.
+#[test]
+fn a_file_of_h5py_is_read_exactly() {
+    let recording = Recording::read(&fixture("small.hdf5")).unwrap();
+    let state = |t: usize| [t as f32 / 8.0, (t * t) as f32, -(t as f32)];
+    assert_eq!((recording.state_dim, recording.action_dim), (3, 2));
+    assert_eq!(recording.observations, (0..12).flat_map(state).collect::<Vec<_>>());
+    assert_eq!(recording.next_observations, (1..13).flat_map(state).collect::<Vec<_>>());
+    let actions = (0..12).flat_map(|row| [row as f32 / 16.0, -(row as f32) / 16.0]);
+    assert_eq!(recording.actions, actions.collect::<Vec<_>>());
+    assert_eq!(recording.rewards, (0..12).map(|row| row as f32 / 4.0).collect::<Vec<_>>());
+    assert_eq!(recording.costs, [1.0, 0.0, 0.0].repeat(4));
+    assert_eq!(recording.terminals, (0..12).map(|row| row == 8).collect::<Vec<_>>());
+    assert_eq!(recording.timeouts, (0..12).map(|row| row == 3).collect::<Vec<_>>());
+}
+
+/// `sha256sum small.hdf5`
+#[test]
+fn the_hash_is_that_of_the_file() {
+    let recording = Recording::read(&fixture("small.hdf5")).unwrap();
+    let hex: String = recording.sha256.iter().map(|byte| format!("{byte:02x}")).collect();
+    assert_eq!(hex, "be7bbf96b42e4d7632472b5cb5cfbb851a31bf0a929e8a99e4db58e7d769d114");
+}
+
+#[test]
+fn flags_of_every_kind_and_shape_mean_the_same() {
+    let folder = tempfile::tempdir().unwrap();
+    let read = |table: Table| {
+        let recording = Recording::read(&table.write(folder.path(), "flags.hdf5")).unwrap();
+        (recording.terminals, recording.timeouts)
+    };
+    let expected = read(Table::sound());
+    assert_eq!(expected.1, [false, false, false, false, false, true]);
+    let n = ROWS as u64;
+    let kinds: [fn() -> Values; 5] = [
+        || Values::U8(vec![0, 0, 0, 0, 0, 1]),
+        || Values::I8(vec![0, 0, 0, 0, 0, 1]),
+        || Values::F32(vec![0.0, 0.0, 0.0, 0.0, 0.0, 1.0]),
+        || Values::F64(vec![0.0, 0.0, 0.0, 0.0, 0.0, 1.0]),
+        || Values::Bool(vec![false, false, false, false, false, true]),
+    ];
+    for kind in kinds {
+        for shape in [vec![n], vec![n, 1]] {
+            assert_eq!(read(Table::sound().with("timeouts", &shape, kind())), expected);
+        }
+    }
+}
+
+#[test]
+fn numbers_of_every_kind_and_shape_mean_the_same() {
+    let folder = tempfile::tempdir().unwrap();
+    let read = |table: Table| Dataset::read(&table.write(folder.path(), "numbers.hdf5")).unwrap();
+    let costs = |shape: &[u64], values| {
+        let dataset = read(Table::sound().with("costs", shape, values));
+        (0..dataset.len()).map(|row| dataset.cost(row)).collect::<Vec<_>>()
+    };
+    let expected = [1.0f32, 0.0, 0.25, 0.0, 1.0, 0.0];
+    let n = ROWS as u64;
+    assert_eq!(costs(&[n], Values::F32(expected.to_vec())), expected);
+    assert_eq!(costs(&[n, 1], Values::F32(expected.to_vec())), expected);
+    assert_eq!(costs(&[n], Values::F64(expected.map(f64::from).to_vec())), expected);
+    assert_eq!(costs(&[n, 1], Values::F32BigEndian(expected.to_vec())), expected);
+}
