@@ -1,1 +1,64 @@
-//! placeholder
+//! The controller: a state and an incurred cost in, a bounded action out.
+//!
+//! It reads a policy image in place, keeps the episode's cost budget, and runs
+//! the denoising chain from noise to an action at every control step. It never
+//! allocates, never reads a clock, never panics and never sees a reward; its
+//! RAM is a constant known when the firmware is built
+//! ([`Controller::RAM_BYTES`]), and every machine computes the same bits.
+//!
+//! | paper | here |
+//! |---|---|
+//! | section 3.5, the control loop | `controller.rs` |
+//! | Eq. 12, the reverse process | `sampler.rs` |
+//! | Appendix B, the denoiser | `denoiser.rs` |
+//! | its matrix-vector products, in one order | `kernel/` |
+//!
+//! Words: a *policy* is a trained network and its chains, in flash; *kappa* is
+//! the cost that may still be incurred in this episode; a *chain* is a run of
+//! the denoiser from noise to an action; a *rung* is one of the chains that an
+//! image carries; the *fallback* is the action that the image names for when
+//! none can be computed; the *golden trace* is an episode in the image that
+//! the controller must reproduce bit for bit before it may fly ([`golden`]).
+//!
+//! ```no_run
+//! use armor_core::{image::PolicyImage, units::CostLimit};
+//! use armor_infer::{Controller, Policy, golden};
+//!
+//! // The largest state and action, and the widest layer, that this firmware flies.
+//! const STATE: usize = 60;
+//! const ACTION: usize = 2;
+//! const HIDDEN: usize = 256;
+//!
+//! # fn sense() -> ([f32; 60], f32) { unimplemented!() }
+//! # fn act(_: &[f32]) {}
+//! # fn fly(flash: &'static [u8]) -> Result<(), Box<dyn core::error::Error>> {
+//! let image = PolicyImage::new_checked(flash)?; // 16-byte aligned, read in place
+//! golden::replay::<STATE, ACTION, HIDDEN>(&image)?;
+//! let policy = Policy::load(&image)?;
+//! let (limit, seed) = (CostLimit::new(20.0)?, 1);
+//! let mut controller = Controller::<STATE, ACTION, HIDDEN>::new(policy, limit, seed)?;
+//! loop {
+//!     let (state, incurred) = sense();
+//!     let step = controller.step(&state, incurred);
+//!     act(step.action.as_slice());
+//! }
+//! # }
+//! ```
+
+#![no_std]
+#![forbid(unsafe_code)]
+
+#[cfg(test)]
+extern crate std;
+
+mod controller;
+mod denoiser;
+#[cfg(test)]
+mod fixture;
+pub mod golden;
+mod kernel;
+mod policy;
+mod sampler;
+
+pub use controller::{Controller, Fault, Step};
+pub use policy::{LoadError, Policy};

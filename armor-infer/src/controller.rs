@@ -1,0 +1,170 @@
+//! The control loop of section 3.5.
+//!
+//! Responsibilities, at every control step:
+//! - charge the cost that the last action incurred to the budget;
+//! - answer the sensed state with an action within the policy's bounds,
+//!   whatever the state, the cost and the weights are;
+//! - name the fault, if there was one.
+//!
+//! Important terms:
+//! - *limit*: the cost that an episode may incur, `d` of Eq. 1;
+//! - *kappa*: what is left of it; `d` at the start, then
+//!   `max(0, kappa - cost)` after each step, and nothing but a new episode
+//!   refills it;
+//! - *incurred*: the cost of the step before, as the robot reports it;
+//! - *tick*: the control step of the episode, from 0; with the seed it
+//!   addresses the noise, so a step can be repeated bit for bit;
+//! - *fallback*: the action that the image names for when none can be computed;
+//! - *fault*: why the step was not an ordinary one.
+
+use core::fmt;
+
+use armor_core::budget::Budget;
+use armor_core::noise::Noise;
+use armor_core::units::{Cost, CostLimit};
+use nalgebra::SVector;
+
+use crate::denoiser::Denoiser;
+use crate::policy::{LoadError, Policy, RUNG};
+use crate::sampler::{NotFinite, Sampler};
+
+/// A policy in flight: its numbers in flash, its budget, and all the memory it works in.
+///
+/// The capacities are the largest state and action vectors and the widest
+/// layer of the policies that it may be given.
+pub struct Controller<'a, const STATE: usize, const ACTION: usize, const HIDDEN: usize> {
+    policy: Policy<'a>,
+    budget: Budget,
+    noise: Noise,
+    tick: u64,
+    denoiser: Denoiser<STATE, HIDDEN>,
+    sampler: Sampler<ACTION>,
+}
+
+/// The answer to a control step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Step<const ACTION: usize> {
+    /// What to do, within the policy's bounds; entries beyond its action dimension are 0.
+    pub action: SVector<f32, ACTION>,
+    /// The budget left after the incurred cost was charged.
+    pub kappa: Cost,
+    /// Which of the image's chains flew.
+    pub rung: usize,
+    /// Why the step was not an ordinary one.
+    ///
+    /// Where two faults coincide, the one that decided the action is named: the
+    /// other can only be [`Fault::InvalidCost`], and `kappa` is 0 then.
+    pub fault: Option<Fault>,
+}
+
+/// Why a control step was not an ordinary one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fault {
+    /// The state has not the policy's length; the action is the fallback.
+    StateLength,
+    /// The state holds a NaN or an infinity; the action is the fallback.
+    StateNotFinite,
+    /// The incurred cost was negative, NaN or infinite. The whole budget was
+    /// charged, and the action is the policy's at kappa 0.
+    InvalidCost,
+    /// The network answered with a NaN or an infinity; the action is the fallback.
+    ActionNotFinite,
+}
+
+impl fmt::Display for Fault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::StateLength => "state has the wrong length; the fallback action was taken, check the sensors' layout",
+            Self::StateNotFinite => "state is not finite; the fallback action was taken, check the sensors",
+            Self::InvalidCost => "incurred cost is no cost; the whole budget was charged, check the cost monitor",
+            Self::ActionNotFinite => {
+                "the network's answer is not finite; the fallback action was taken, check the state's range"
+            }
+        })
+    }
+}
+
+impl From<NotFinite> for Fault {
+    fn from(_: NotFinite) -> Self {
+        Self::ActionNotFinite
+    }
+}
+
+impl<'a, const STATE: usize, const ACTION: usize, const HIDDEN: usize> Controller<'a, STATE, ACTION, HIDDEN> {
+    /// All the memory that a controller takes, in bytes.
+    pub const RAM_BYTES: usize = size_of::<Self>();
+
+    /// A controller at the start of an episode of the given limit; `seed`
+    /// decides the noise of all its chains.
+    ///
+    /// # Errors
+    /// [`LoadError`] if the policy does not fit the capacities, or the limit
+    /// exceeds the budgets that it was trained with.
+    pub fn new(policy: Policy<'a>, limit: CostLimit, seed: u64) -> Result<Self, LoadError> {
+        policy.check_capacities(STATE, ACTION, HIDDEN)?;
+        policy.check_limit(limit)?;
+        Ok(Self {
+            policy,
+            budget: Budget::new(limit),
+            noise: Noise::new(seed),
+            tick: 0,
+            denoiser: Denoiser::new(),
+            sampler: Sampler::new(),
+        })
+    }
+
+    /// Starts a new episode: the only way to refill the budget.
+    ///
+    /// # Errors
+    /// [`LoadError::LimitAboveTrainedRange`]; the episode before goes on then.
+    pub fn new_episode(&mut self, limit: CostLimit, seed: u64) -> Result<(), LoadError> {
+        self.policy.check_limit(limit)?;
+        self.budget = Budget::new(limit);
+        self.noise = Noise::new(seed);
+        self.tick = 0;
+        Ok(())
+    }
+
+    /// One control step: charges `incurred`, the cost of the step before (0 on
+    /// the first), then answers `state` `[S]` with an action.
+    pub fn step(&mut self, state: &[f32], incurred: f32) -> Step<ACTION> {
+        let charged = self.budget.charge(incurred);
+
+        let mut action = SVector::<f32, ACTION>::zeros();
+        let entries = action.as_mut_slice().get_mut(..usize::from(self.policy.shape.action)).unwrap_or_default();
+        let acted = self.act(state, entries);
+        if acted.is_err() {
+            for (entry, fallback) in entries.iter_mut().zip(self.policy.sections.action_fallback) {
+                *entry = *fallback;
+            }
+        }
+        self.tick = self.tick.wrapping_add(1);
+
+        let fault = acted.err().or(charged.err().map(|_| Fault::InvalidCost));
+        Step { action, kappa: self.kappa(), rung: RUNG, fault }
+    }
+
+    /// What is left of the budget.
+    pub const fn kappa(&self) -> Cost {
+        self.budget.remaining()
+    }
+
+    /// Computes the policy's action at this tick and budget, into `action` `[A]`.
+    fn act(&mut self, state: &[f32], action: &mut [f32]) -> Result<(), Fault> {
+        if state.len() != usize::from(self.policy.shape.state) {
+            return Err(Fault::StateLength);
+        }
+        if state.iter().any(|value| !value.is_finite()) {
+            return Err(Fault::StateNotFinite);
+        }
+        self.denoiser.prepare(&self.policy, state, self.budget.remaining());
+        self.sampler.run(&self.policy, &mut self.denoiser, &self.noise, self.tick, action)?;
+        Ok(())
+    }
+}
+
+/// The largest shape that a small microcontroller is meant to hold.
+const _: () = assert!(Controller::<96, 8, 256>::RAM_BYTES <= 6 * 1024);
+
+#[cfg(test)]
+mod tests;

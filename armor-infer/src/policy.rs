@@ -1,0 +1,142 @@
+//! A policy, read in place from its image.
+
+use core::fmt;
+
+use armor_core::image::{KappaRange, PolicyImage, Precision, Sections};
+use armor_core::schedule::ChainStep;
+use armor_core::shape::Shape;
+use armor_core::units::{Cost, CostLimit};
+
+/// The rung that the controller flies: the image's first, which is its longest.
+pub(crate) const RUNG: usize = 0;
+
+/// A view of a policy's numbers in the bytes of its image.
+///
+/// Cheap to copy: it borrows the image's bytes and none of its manifest.
+#[derive(Clone, Copy, Debug)]
+pub struct Policy<'a> {
+    pub(crate) shape: Shape,
+    pub(crate) kappa: KappaRange,
+    pub(crate) sections: Sections<'a>,
+    /// The steps of [`RUNG`].
+    chain: &'a [[u32; ChainStep::WORDS]],
+}
+
+/// Why a policy cannot fly on this controller.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LoadError {
+    /// The policy's state vector is longer than `STATE`.
+    StateCapacity {
+        /// Entries of the policy's state vector.
+        needed: usize,
+        /// `STATE` of the controller.
+        capacity: usize,
+    },
+    /// The policy's action vector is longer than `ACTION`.
+    ActionCapacity {
+        /// Entries of the policy's action vector.
+        needed: usize,
+        /// `ACTION` of the controller.
+        capacity: usize,
+    },
+    /// A layer of the denoiser or of the kappa embedding is wider than `HIDDEN`.
+    HiddenCapacity {
+        /// Width of the policy's widest layer.
+        needed: usize,
+        /// `HIDDEN` of the controller.
+        capacity: usize,
+    },
+    /// The cost limit lies above every budget that the policy was trained with.
+    LimitAboveTrainedRange {
+        /// The limit that was asked for.
+        limit: Cost,
+        /// The largest limit that the policy may be given.
+        trained_max: Cost,
+    },
+    /// There is no kernel for the number format of the policy.
+    Precision(Precision),
+}
+
+impl fmt::Display for LoadError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::StateCapacity { needed, capacity } => write!(
+                f,
+                "the policy senses {needed} state entries, the controller holds {capacity}; build it with STATE >= {needed} or flash a policy for this robot"
+            ),
+            Self::ActionCapacity { needed, capacity } => write!(
+                f,
+                "the policy moves {needed} action entries, the controller holds {capacity}; build it with ACTION >= {needed} or flash a policy for this robot"
+            ),
+            Self::HiddenCapacity { needed, capacity } => write!(
+                f,
+                "the policy's widest layer has {needed} units, the controller holds {capacity}; build it with HIDDEN >= {needed} or train a narrower policy"
+            ),
+            Self::LimitAboveTrainedRange { limit, trained_max } => write!(
+                f,
+                "cost limit {limit} lies above what the policy was trained with; set a limit of at most {trained_max}"
+            ),
+            Self::Precision(precision) => {
+                write!(f, "this controller has no kernel for {precision:?}; export the policy again as F32")
+            }
+        }
+    }
+}
+
+impl core::error::Error for LoadError {}
+
+impl<'a> Policy<'a> {
+    /// The policy of an image, read in place.
+    ///
+    /// # Errors
+    /// [`LoadError::Precision`]; the capacities are checked by the controller
+    /// that the policy is given to.
+    pub fn load(image: &PolicyImage<'a>) -> Result<Self, LoadError> {
+        let manifest = image.manifest();
+        if manifest.precision != Precision::F32 {
+            return Err(LoadError::Precision(manifest.precision));
+        }
+        Ok(Self {
+            shape: manifest.shape,
+            kappa: manifest.kappa,
+            sections: *image.sections(),
+            chain: image.sections().chain_words(manifest, RUNG),
+        })
+    }
+
+    /// Dimensions of the policy network.
+    pub const fn shape(&self) -> &Shape {
+        &self.shape
+    }
+
+    /// The steps of the chain that the controller flies.
+    pub(crate) fn chain(&self) -> impl ExactSizeIterator<Item = ChainStep> + use<'a> {
+        self.chain.iter().map(|words| ChainStep::from_words(*words))
+    }
+
+    /// Whether buffers of these capacities hold every vector of the network.
+    pub(crate) fn check_capacities(&self, state: usize, action: usize, hidden: usize) -> Result<(), LoadError> {
+        let shape = &self.shape;
+        let widest = usize::from(shape.hidden.max(shape.kappa_hidden).max(shape.kappa_embedding));
+        let (needed_state, needed_action) = (usize::from(shape.state), usize::from(shape.action));
+        if needed_state > state {
+            return Err(LoadError::StateCapacity { needed: needed_state, capacity: state });
+        }
+        if needed_action > action {
+            return Err(LoadError::ActionCapacity { needed: needed_action, capacity: action });
+        }
+        if widest > hidden {
+            return Err(LoadError::HiddenCapacity { needed: widest, capacity: hidden });
+        }
+        Ok(())
+    }
+
+    /// Whether the policy was trained with budgets as large as `limit`.
+    pub(crate) fn check_limit(&self, limit: CostLimit) -> Result<(), LoadError> {
+        let (limit, trained_max) = (limit.cost(), self.kappa.trained_max);
+        if limit > trained_max {
+            return Err(LoadError::LimitAboveTrainedRange { limit, trained_max });
+        }
+        Ok(())
+    }
+}
