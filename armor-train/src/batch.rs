@@ -45,12 +45,7 @@ impl<T: Scalar> Batch<T> {
     }
 
     /// Number of samples.
-    pub fn len(&self) -> usize {
+    pub fn samples(&self) -> usize {
         self.reward.len()
-    }
-
-    /// Whether there is no sample.
-    pub fn is_empty(&self) -> bool {
-        self.reward.is_empty()
     }
 }

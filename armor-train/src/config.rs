@@ -11,6 +11,8 @@ use crate::actor::PolicyGradient;
 pub struct Config {
     /// Preset that the other keys started from.
     pub preset: Preset,
+    /// Path of the recorded data.
+    pub data: String,
     /// Task, such as `ball-run`.
     pub task: String,
     /// Cost limit `d` of an episode, in units of recorded cost (Eq. 1).
@@ -116,6 +118,7 @@ impl Preset {
     pub fn config(self, task: &str, limit: f64) -> Config {
         let paper = Config {
             preset: Self::Paper,
+            data: String::new(),
             task: task.to_owned(),
             limit,
             seed: 0,
@@ -223,7 +226,7 @@ impl Config {
             assignment.split_once('=').ok_or_else(|| ConfigError::NotAnAssignment(assignment.to_owned()))?;
         let (key, value) = (key.trim(), value.trim());
         let bad = |reason: String| ConfigError::BadValue { key: key.to_owned(), value: value.to_owned(), reason };
-        let mut table = toml::Table::try_from(&*self).map_err(|error| bad(error.to_string()))?;
+        let mut table = self.options();
         if !table.contains_key(key) {
             let similarity = |name: &&String| (strsim::jaro_winkler(name, key) * 1e6) as u64;
             let nearest = table.keys().max_by_key(similarity).cloned().unwrap_or_default();
@@ -241,6 +244,12 @@ impl Config {
         table.insert(key.to_owned(), parsed);
         *self = table.try_into().map_err(|error: toml::de::Error| bad(error.message().to_owned()))?;
         Ok(())
+    }
+
+    /// All options by name, as `config.toml` holds them.
+    pub fn options(&self) -> toml::Table {
+        // Numbers, names and flags: nothing in it that TOML could not say.
+        toml::Table::try_from(self).unwrap_or_default()
     }
 
     /// Whether every option lies in its range.

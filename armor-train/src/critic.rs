@@ -73,17 +73,12 @@ impl Critic {
     }
 
     /// Numbers of the network.
-    pub fn len(&self) -> usize {
+    pub fn size(&self) -> usize {
         self.heads[2][1].end()
     }
 
-    /// Whether the network has no numbers; it always has some.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-
     /// Numbers of the shared trunk, which come first.
-    pub fn trunk_len(&self) -> usize {
+    pub fn trunk_size(&self) -> usize {
         self.trunk.end()
     }
 
@@ -245,7 +240,7 @@ mod tests {
     fn fixture() -> Fixture {
         let critic = Critic::new(3, 2, 6, 5, 0.5);
         Fixture {
-            parameters: fill(critic.len(), 1),
+            parameters: fill(critic.size(), 1),
             state: DMatrix::from_vec(3, SAMPLES, fill(3 * SAMPLES, 2)),
             kappa: vec![0.0, 1.0, 2.0, 3.0, 0.5],
             action: DMatrix::from_vec(2, SAMPLES, fill(2 * SAMPLES, 3)),
@@ -259,8 +254,8 @@ mod tests {
         let f = fixture();
         for task in Task::ALL {
             let mut tape = f.critic.tape(SAMPLES);
-            let mut gradient = vec![0.0; f.critic.len()];
-            let mut trunk = vec![0.0; f.critic.trunk_len()];
+            let mut gradient = vec![0.0; f.critic.size()];
+            let mut trunk = vec![0.0; f.critic.trunk_size()];
             f.critic.forward(&f.parameters, &[task], (&f.state, &f.kappa, &f.action), &mut tape, true);
             f.critic.backward_td(&f.parameters, task, &f.target, SAMPLES, &mut tape, (&mut gradient, &mut trunk));
             gradient[..trunk.len()].copy_from_slice(&trunk);

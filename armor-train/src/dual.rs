@@ -31,13 +31,8 @@ impl Dual {
     }
 
     /// Numbers of the network.
-    pub fn len(&self) -> usize {
+    pub fn size(&self) -> usize {
         self.network.end()
-    }
-
-    /// Whether the network has no numbers; it always has some.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
     }
 
     /// PyTorch's default initialisation from draws in `[0, 1)`.
@@ -103,15 +98,15 @@ mod tests {
     #[test]
     fn gradient_is_that_of_finite_differences() {
         let dual = Dual::new(6, 0.1);
-        let parameters = fill(dual.len(), 1);
+        let parameters = fill(dual.size(), 1);
         let violation = fill(4, 2);
         let loss = |parameters: &[f64]| {
             let mut tape = dual.tape(4);
             dual.forward(parameters, &KAPPA, &mut tape);
-            dual.backward(parameters, &violation, 4, &mut tape, &mut vec![0.0; dual.len()]) / 4.0
+            dual.backward(parameters, &violation, 4, &mut tape, &mut vec![0.0; dual.size()]) / 4.0
         };
         let mut tape = dual.tape(4);
-        let mut gradient = vec![0.0; dual.len()];
+        let mut gradient = vec![0.0; dual.size()];
         dual.forward(&parameters, &KAPPA, &mut tape);
         dual.backward(&parameters, &violation, 4, &mut tape, &mut gradient);
         assert_gradient(&parameters, &gradient, loss);
@@ -119,13 +114,13 @@ mod tests {
 
     fn after_ascent(violation: f64) -> (f64, f64) {
         let dual = Dual::new(6, 0.1);
-        let mut parameters = fill(dual.len(), 1);
+        let mut parameters = fill(dual.size(), 1);
         let mut tape = dual.tape(4);
         dual.forward(&parameters, &KAPPA, &mut tape);
         let before = tape.lambda[1];
-        let mut adam = Adam::new(dual.len(), 1e-2);
+        let mut adam = Adam::new(dual.size(), 1e-2);
         for _ in 0..2000 {
-            let mut gradient = vec![0.0; dual.len()];
+            let mut gradient = vec![0.0; dual.size()];
             dual.forward(&parameters, &KAPPA, &mut tape);
             dual.backward(&parameters, &[violation; 4], 4, &mut tape, &mut gradient);
             adam.descend(&mut parameters, &gradient);
@@ -146,7 +141,7 @@ mod tests {
     #[test]
     fn beyond_the_clip_lambda_stays_at_its_bound() {
         let dual = Dual::new(2, 1.0);
-        let mut parameters = vec![0.0; dual.len()];
+        let mut parameters = vec![0.0; dual.size()];
         for (bias, bound) in [(-30.0, (-20f64).exp()), (9.0, 148.413_159_102_576_6)] {
             *parameters.last_mut().unwrap() = bias;
             let mut tape = dual.tape(1);

@@ -137,7 +137,7 @@ impl<'d, T: Scalar> Learner<'d, T> {
         let source = Source { config: &self.config, data: self.data, normaliser: &self.normaliser };
         let (weights, rows) = (&self.weights.combined, self.data.len() as u32);
         self.workers.par_iter_mut().for_each(|worker| {
-            for sample in 0..worker.batch.len() {
+            for sample in 0..worker.batch.samples() {
                 let place = worker.first + sample;
                 let word = |stream| noise.words(stream, step, place as u32 / 4)[place % 4];
                 let row = below(word(stream::ROWS), rows) as usize;

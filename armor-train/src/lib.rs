@@ -15,16 +15,19 @@
 
 pub mod actor;
 pub mod batch;
+pub mod cli;
 pub mod config;
 pub mod critic;
 pub mod data;
 pub mod dual;
+pub mod export;
 pub mod learner;
 pub mod model;
 pub mod nn;
 pub mod normaliser;
 pub mod pcgrad;
 pub mod reweight;
+pub mod run;
 mod stream;
 #[cfg(test)]
 mod testing;

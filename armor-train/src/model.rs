@@ -89,9 +89,9 @@ impl Model {
                 .flat_map(move |block| noise.words(stream::INITIALISE, network, block))
                 .map(|word| f64::from(uniform(word)))
         };
-        let mut actor = vec![T::zero(); self.actor.denoiser.len()];
-        let mut critic = vec![T::zero(); self.critic.len()];
-        let mut dual = vec![T::zero(); self.dual.len()];
+        let mut actor = vec![T::zero(); self.actor.denoiser.size()];
+        let mut critic = vec![T::zero(); self.critic.size()];
+        let mut dual = vec![T::zero(); self.dual.size()];
         self.actor.denoiser.initialise(&mut actor, &mut draws(0));
         self.critic.initialise(&mut critic, &mut draws(1));
         self.dual.initialise(&mut dual, &mut draws(2));

@@ -66,12 +66,12 @@ impl<T: Scalar> Worker<T> {
             target_tape: model.critic.tape(samples),
             critic_tape: model.critic.tape(samples),
             targets: Vec::with_capacity(samples),
-            critic_gradient: vec![T::zero(); model.critic.len()],
-            trunk_gradients: [(); 3].map(|()| vec![T::zero(); model.critic.trunk_len()]),
+            critic_gradient: vec![T::zero(); model.critic.size()],
+            trunk_gradients: [(); 3].map(|()| vec![T::zero(); model.critic.trunk_size()]),
             critic_losses: [0.0; 3],
             actor_tape: model.actor.tape(&model.critic, &model.dual, samples),
-            actor_gradient: vec![T::zero(); denoiser.len()],
-            dual_gradient: vec![T::zero(); model.dual.len()],
+            actor_gradient: vec![T::zero(); denoiser.size()],
+            dual_gradient: vec![T::zero(); model.dual.size()],
             actor_loss: ActorLoss::default(),
         }
     }
@@ -142,21 +142,23 @@ pub fn update_critic<T: Scalar>(
     draw: &Draw<'_, T>,
     orders: &[[usize; 2]; 3],
 ) -> (CriticMetrics, Vec<T>) {
-    let batch_len = workers.iter().map(|worker| worker.batch.len()).sum();
+    let batch_len = workers.iter().map(|worker| worker.batch.samples()).sum();
     let shared = &*parameters;
     workers.par_iter_mut().for_each(|worker| worker.judge(model, shared, batch_len, draw));
 
-    let mut gradient = vec![T::zero(); model.critic.len()];
-    let mut trunk = [(); 3].map(|()| vec![T::zero(); model.critic.trunk_len()]);
+    let mut gradient = vec![T::zero(); model.critic.size()];
+    let mut trunk = [(); 3].map(|()| vec![T::zero(); model.critic.trunk_size()]);
     let mut metrics = CriticMetrics::default();
     for worker in workers {
         accumulate(&mut gradient, &worker.critic_gradient);
-        for task in 0..3 {
-            accumulate(&mut trunk[task], &worker.trunk_gradients[task]);
-            metrics.losses[task] += worker.critic_losses[task] / batch_len as f64;
+        for (sum, part) in trunk.iter_mut().zip(&worker.trunk_gradients) {
+            accumulate(sum, part);
+        }
+        for (sum, part) in metrics.losses.iter_mut().zip(worker.critic_losses) {
+            *sum += part / batch_len as f64;
         }
     }
-    metrics.conflicts = pcgrad::project(&trunk, orders, &mut gradient[..model.critic.trunk_len()]);
+    metrics.conflicts = pcgrad::project(&trunk, orders, &mut gradient[..model.critic.trunk_size()]);
     optimisers.critic.descend(&mut parameters.critic, &gradient);
     (metrics, gradient)
 }
@@ -172,7 +174,7 @@ pub fn update_actor<T: Scalar>(
     workers: &mut [Worker<T>],
     draw: &Draw<'_, T>,
 ) -> (ActorLoss, [Vec<T>; 2]) {
-    let batch_len = workers.iter().map(|worker| worker.batch.len()).sum();
+    let batch_len = workers.iter().map(|worker| worker.batch.samples()).sum();
     let shared = &*parameters;
     workers.par_iter_mut().for_each(|worker| worker.improve(model, shared, batch_len, draw));
 

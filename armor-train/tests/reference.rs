@@ -139,7 +139,7 @@ impl Reference {
         let (critic, gradient) = update_critic(&model, &mut parameters, &mut optimisers, &mut workers, &next, &ORDERS);
         self.expect("critic_losses", &critic.losses);
         assert_eq!(critic.conflicts as f64, self.number("negative_pairs"));
-        self.expect("trunk_grad", &gradient[..model.critic.trunk_len()]);
+        self.expect("trunk_grad", &gradient[..model.critic.trunk_size()]);
         self.expect("critic_grad", &gradient);
         self.expect("critic_after", &parameters.critic);
 

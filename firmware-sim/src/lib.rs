@@ -1,1 +1,43 @@
-//! placeholder
+//! The controller's world: what it flies, what it is flashed to, and what
+//! proves that it is what was trained.
+//!
+//! | here | says |
+//! |---|---|
+//! | [`task`], [`plant`] | the tasks and their scores; robots in f64, equal to their simulators |
+//! | [`calibrate`] | how far a plant is from a recording |
+//! | [`image_file`], [`chip`] | an image in a file; two slots of flash that boot one |
+//! | [`host`], [`flight`], [`summary`] | the controller on this computer, in a fixed-rate loop, and its scores |
+//! | [`latency`], [`telemetry`] | what each action took; a line a control step |
+//! | [`reference`](mod@reference), [`verify`](mod@verify) | a second evaluation in f64; the checks of an image |
+//! | [`cli`] | the commands |
+//! | [`file`](mod@file), [`memory`] | files written whole; bytes on a 16-byte boundary |
+//!
+//! What flies is always an image that was read back and checked, through the
+//! `armor-infer` that a microcontroller runs: nothing here computes an action
+//! of its own but [`reference`](mod@reference), to compare.
+//!
+//! Words: a *plant* is a robot and its task; a *slot* is a place for an image;
+//! a *flight* is several episodes of one policy; *latency* is host time around
+//! the controller's step, while the flight's own clock is virtual.
+
+#![forbid(unsafe_code)]
+
+pub mod calibrate;
+pub mod chip;
+pub mod cli;
+pub mod file;
+#[cfg(test)]
+mod fixture;
+pub mod flight;
+pub mod host;
+pub mod image_file;
+pub mod latency;
+pub mod memory;
+pub mod plant;
+#[cfg(test)]
+mod recorded;
+pub mod reference;
+pub mod summary;
+pub mod task;
+pub mod telemetry;
+pub mod verify;

@@ -131,13 +131,8 @@ impl Denoiser {
     }
 
     /// Numbers of the network.
-    pub fn len(&self) -> usize {
+    pub fn size(&self) -> usize {
         self.body.end()
-    }
-
-    /// Whether the network has no numbers; it always has some.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
     }
 
     /// Inputs of the first layer that are the noisy action, the state, the kappa and the time embedding.

@@ -172,7 +172,7 @@ impl Actor {
         dual.forward(dual_parameters, &batch.kappa, &mut tape.dual);
         let dual_loss = dual.backward(dual_parameters, &tape.violation, batch_len, &mut tape.dual, dual_gradient);
 
-        let reward_slope = vec![-T::of(self.eta) * share; batch.len()];
+        let reward_slope = vec![-T::of(self.eta) * share; batch.samples()];
         let cost_slope: Vec<T> = tape.dual.lambda.iter().map(|&lambda| lambda * share).collect();
         let slopes = [(Task::Reward, &reward_slope[..]), (Task::LongCost, &cost_slope[..])];
         critic.action_gradient(critic_parameters, &slopes, &mut tape.critic, &mut tape.action_gradient);

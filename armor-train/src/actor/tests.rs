@@ -44,9 +44,9 @@ fn fixture(policy_gradient: PolicyGradient) -> Fixture {
     batch.kappa = vec![0.0, 1.0, 2.0, 3.0];
     batch.weight = vec![0.8, 1.0, 1.5, 2.0];
     Fixture {
-        parameters: fill(denoiser.len(), 1),
-        critic_parameters: fill(critic.len(), 2),
-        dual_parameters: fill(dual.len(), 3),
+        parameters: fill(denoiser.size(), 1),
+        critic_parameters: fill(critic.size(), 2),
+        dual_parameters: fill(dual.size(), 3),
         actor: Actor { denoiser, schedule: VpSchedule::new(STEPS), policy_gradient, eta: 0.7 },
         critic,
         dual,

@@ -3,8 +3,7 @@
 //! A file's claims are checked before they cost memory: the types and shapes of
 //! all data sets first, then the values of those whose rows agree.
 
-use std::path::Path;
-use std::{fmt, io};
+use std::fmt;
 
 use hdf5_pure::{Datatype, Error, File, FormatError};
 use sha2::{Digest, Sha256};
@@ -30,15 +29,11 @@ pub(super) struct Contents {
     pub(super) faults: Vec<Fault>,
 }
 
-/// Reads every data set of `path` that can be read.
+/// Reads every data set that can be read from the bytes of a file.
 ///
 /// # Errors
-/// The [`Fault`] of a file that cannot be opened as HDF5 at all.
-pub(super) fn read(path: &Path) -> Result<Contents, Fault> {
-    let bytes = std::fs::read(path).map_err(|error| match error.kind() {
-        io::ErrorKind::NotFound => Fault::NotFound,
-        _ => Fault::Unreadable { reason: error.to_string() },
-    })?;
+/// The [`Fault`] of bytes that cannot be opened as HDF5 at all.
+pub(super) fn parse(bytes: Vec<u8>) -> Result<Contents, Fault> {
     let sha256 = Sha256::digest(&bytes).into();
     let file = open(bytes)?;
 
@@ -112,8 +107,7 @@ fn is_supported(key: Key, found: &Datatype) -> bool {
 fn disagreements(sources: &mut [Option<Source>; 7]) -> Vec<Fault> {
     let mut faults = Vec::new();
     let rows: Vec<u64> = sources.iter().flatten().map(|source| source.rows).collect();
-    // The last of equals wins in `max_by_key`: from behind, that is the first data set.
-    let most = rows.iter().rev().max_by_key(|count| rows.iter().filter(|other| other == count).count());
+    let most = rows.iter().max_by_key(|count| rows.iter().filter(|other| other == count).count());
     let Some(&expected) = most else {
         return faults;
     };

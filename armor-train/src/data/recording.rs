@@ -1,5 +1,6 @@
 //! A recording as it stands in its file, and what must hold for its values.
 
+use std::io;
 use std::path::Path;
 
 use armor_core::units::Cost;
@@ -43,16 +44,25 @@ impl Recording {
     /// # Errors
     /// [`DataError`] with the first [`Fault`]; [`check`](super::check) lists them all.
     pub fn read(path: &Path) -> Result<Self, DataError> {
-        Self::read_or_faults(path).map_err(|faults| {
-            // `Err` always carries a fault.
-            let fault = faults.into_iter().next().unwrap_or(Fault::Empty);
-            DataError { file: path.to_owned(), fault }
-        })
+        read_bytes(path).and_then(Self::from_bytes).map_err(|fault| DataError { file: path.to_owned(), fault })
+    }
+
+    /// Reads the bytes of an HDF5 file.
+    ///
+    /// # Errors
+    /// The first [`Fault`].
+    pub fn from_bytes(bytes: Vec<u8>) -> Result<Self, Fault> {
+        // `Err` always carries a fault.
+        Self::or_faults(bytes).map_err(|faults| faults.into_iter().next().unwrap_or(Fault::Empty))
     }
 
     /// Reads a file whole, or names everything that is wrong with it.
     pub(super) fn read_or_faults(path: &Path) -> Result<Self, Vec<Fault>> {
-        let Contents { sha256, columns, mut faults } = hdf5::read(path).map_err(|fault| vec![fault])?;
+        read_bytes(path).map_err(|fault| vec![fault]).and_then(Self::or_faults)
+    }
+
+    fn or_faults(bytes: Vec<u8>) -> Result<Self, Vec<Fault>> {
+        let Contents { sha256, columns, mut faults } = hdf5::parse(bytes).map_err(|fault| vec![fault])?;
         for (key, column) in Key::ALL.into_iter().zip(&columns) {
             if let Some(column) = column {
                 faults.extend(value_faults(key, column.width, &column.values));
@@ -118,6 +128,13 @@ impl Recording {
         let ends = self.terminals.iter().chain(&self.timeouts).any(|&flag| flag);
         faults.chain(no_end(rows, ends)).next().map_or(Ok(()), Err)
     }
+}
+
+fn read_bytes(path: &Path) -> Result<Vec<u8>, Fault> {
+    std::fs::read(path).map_err(|error| match error.kind() {
+        io::ErrorKind::NotFound => Fault::NotFound,
+        _ => Fault::Unreadable { reason: error.to_string() },
+    })
 }
 
 fn flags(column: &Column) -> Vec<bool> {

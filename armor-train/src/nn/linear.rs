@@ -20,13 +20,13 @@ pub struct Linear {
 
 impl Linear {
     /// Numbers of the layer: weights, then bias.
-    pub const fn len(&self) -> usize {
+    pub const fn size(&self) -> usize {
         self.inputs * self.outputs + self.outputs
     }
 
     /// Index one past the layer's last number.
     pub const fn end(&self) -> usize {
-        self.offset + self.len()
+        self.offset + self.size()
     }
 
     /// Weights, `outputs x inputs`.

@@ -46,6 +46,12 @@ impl Scalar for f32 {
     fn mish_with_derivative(self) -> (Self, Self) {
         armor_core::mish::mish_with_derivative(self)
     }
+    fn mish_column(values: &mut [Self], bias: &[Self]) {
+        vectorised::mish_column(values, bias);
+    }
+    fn mish_column_with_slopes(values: &mut [Self], slopes: &mut [Self], bias: &[Self]) {
+        vectorised::mish_column_with_slopes(values, slopes, bias);
+    }
     #[inline(always)]
     fn of(value: f64) -> Self {
         value as f32
@@ -96,6 +102,27 @@ impl Scalar for f64 {
         // SAFETY: the caller's promise is the one that `matrixmultiply` asks for.
         unsafe {
             matrixmultiply::dgemm(m, k, n, 1.0, a, a_row, a_column, b, b_row, b_column, beta, out, out_row, out_column);
+        }
+    }
+}
+
+/// The f32 loops, compiled for wider vectors as well and chosen at run time;
+/// without contraction the bits are the same at every width.
+mod vectorised {
+    use armor_core::mish::{mish, mish_with_derivative};
+    use multiversion::multiversion;
+
+    #[multiversion(targets("x86_64+avx512f+avx512vl", "x86_64+avx2"))]
+    pub(super) fn mish_column(values: &mut [f32], bias: &[f32]) {
+        for (value, &bias) in values.iter_mut().zip(bias) {
+            *value = mish(*value + bias);
+        }
+    }
+
+    #[multiversion(targets("x86_64+avx512f+avx512vl", "x86_64+avx2"))]
+    pub(super) fn mish_column_with_slopes(values: &mut [f32], slopes: &mut [f32], bias: &[f32]) {
+        for ((value, slope), &bias) in values.iter_mut().zip(slopes).zip(bias) {
+            (*value, *slope) = mish_with_derivative(*value + bias);
         }
     }
 }

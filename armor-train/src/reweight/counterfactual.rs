@@ -77,7 +77,7 @@ mod tests {
 
     fn margins(kappa: f64) -> Vec<f64> {
         let critic = Critic::new(2, 1, 6, 5, 1.0);
-        let parameters = fill(critic.len(), 1);
+        let parameters = fill(critic.size(), 1);
         let state = DMatrix::from_vec(2, 6, fill(12, 2));
         let action = DMatrix::from_vec(1, 6, fill(6, 3));
         let mut margin = vec![f64::NAN; 6];

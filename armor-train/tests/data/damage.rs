@@ -2,19 +2,11 @@
 //! a sound recording, never a panic.
 
 use std::fs;
-use std::path::Path;
 
 use armor_core::noise::{Noise, below};
 use armor_train::data::{Fault, Recording};
 
 use crate::{fixture, shipped_file};
-
-/// Reads what a file with these bytes holds.
-fn read(folder: &Path, bytes: &[u8]) -> Result<Recording, Fault> {
-    let path = folder.join("damaged.hdf5");
-    fs::write(&path, bytes).unwrap();
-    Recording::read(&path).map_err(|error| error.fault)
-}
 
 #[track_caller]
 fn assert_named(bytes: usize, whole: usize, result: Result<Recording, Fault>) {
@@ -29,16 +21,15 @@ fn assert_named(bytes: usize, whole: usize, result: Result<Recording, Fault>) {
 
 #[test]
 fn a_file_cut_anywhere_is_named_as_such() {
-    let folder = tempfile::tempdir().unwrap();
     let small = fs::read(fixture("small.hdf5")).unwrap();
     for bytes in 0..small.len() {
-        assert_named(bytes, small.len(), read(folder.path(), &small[..bytes]));
+        assert_named(bytes, small.len(), Recording::from_bytes(small[..bytes].to_vec()));
     }
 
     let shipped = fs::read(shipped_file()).unwrap();
     let spread = (0..200).map(|cut| cut * shipped.len() / 200);
     for bytes in spread.chain([1, 7, 8, 95, 96, 97, 2048, shipped.len() - 1]) {
-        assert_named(bytes, shipped.len(), read(folder.path(), &shipped[..bytes]));
+        assert_named(bytes, shipped.len(), Recording::from_bytes(shipped[..bytes].to_vec()));
     }
 }
 
@@ -46,14 +37,13 @@ fn a_file_cut_anywhere_is_named_as_such() {
 /// damage is left for the deeper structures to show.
 #[test]
 fn a_file_cut_behind_the_superblocks_back_is_damaged_or_whole() {
-    let folder = tempfile::tempdir().unwrap();
     let small = fs::read(fixture("small.hdf5")).unwrap();
-    let whole = read(folder.path(), &small).unwrap();
+    let whole = Recording::from_bytes(small.clone()).unwrap();
     let mut damaged = 0;
     for bytes in 48..small.len() {
         let mut cut = small[..bytes].to_vec();
         cut[40..48].copy_from_slice(&(bytes as u64).to_le_bytes());
-        match read(folder.path(), &cut) {
+        match Recording::from_bytes(cut) {
             // What was cut is space that no data set uses.
             Ok(recording) => assert_eq!(Recording { sha256: whole.sha256, ..recording }, whole),
             Err(fault) => {
@@ -69,14 +59,13 @@ fn a_file_cut_behind_the_superblocks_back_is_damaged_or_whole() {
 /// what is read must still be sound.
 #[test]
 fn a_flipped_bit_is_a_named_fault_or_a_sound_recording() {
-    let folder = tempfile::tempdir().unwrap();
     let mut bytes = fs::read(fixture("small.hdf5")).unwrap();
     let noise = Noise::new(0);
     let mut faults = 0;
     for position in 0..bytes.len() {
         let bit = below(noise.words(0, position as u64, 0)[0], 8);
         bytes[position] ^= 1 << bit;
-        match read(folder.path(), &bytes) {
+        match Recording::from_bytes(bytes.clone()) {
             Ok(recording) => assert_sound(&recording),
             Err(_) => faults += 1,
         }
@@ -87,7 +76,6 @@ fn a_flipped_bit_is_a_named_fault_or_a_sound_recording() {
 
 #[test]
 fn many_overwritten_bytes_are_a_named_fault_or_a_sound_recording() {
-    let folder = tempfile::tempdir().unwrap();
     let small = fs::read(fixture("small.hdf5")).unwrap();
     for trial in 0..4000 {
         let mut bytes = small.clone();
@@ -95,7 +83,7 @@ fn many_overwritten_bytes_are_a_named_fault_or_a_sound_recording() {
             let [position, value, ..] = Noise::new(1).words(0, trial, block);
             bytes[below(position, small.len() as u32) as usize] = value as u8;
         }
-        if let Ok(recording) = read(folder.path(), &bytes) {
+        if let Ok(recording) = Recording::from_bytes(bytes) {
             assert_sound(&recording);
         }
     }

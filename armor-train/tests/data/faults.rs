@@ -24,7 +24,7 @@ fn fault_of(path: &Path) -> Fault {
     assert!(error.to_string().starts_with(&format!("{}: ", path.display())));
     let report = check(path);
     assert!(!report.is_sound());
-    assert_eq!(report.faults, [error.fault.clone()]);
+    assert_eq!(report.faults, std::slice::from_ref(&error.fault));
     error.fault
 }
 
@@ -77,6 +77,18 @@ fn a_missing_data_set_is_named_with_those_that_are_there() {
 }
 
 #[test]
+fn a_group_is_no_data_set() {
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join("group.hdf5");
+    let mut file = Table::sound().without("observations").build();
+    let mut group = file.create_group("observations");
+    group.create_dataset("camera").with_f32_data(&[0.0; ROWS]);
+    file.add_group(group.finish());
+    file.write(&path).unwrap();
+    assert!(matches!(fault_of(&path), Fault::MissingKey { key: Key::Observations, .. }));
+}
+
+#[test]
 fn a_shape_that_is_no_row_per_transition() {
     let zeros = |count: u64| Values::F32(vec![0.0; count as usize]);
     for (key, shape) in [
@@ -100,6 +112,24 @@ fn a_type_that_is_no_number_or_no_flag() {
     assert_eq!(fault(whole), Fault::UnsupportedType { key: Key::Costs, found: "i32".to_owned() });
     let wide = Table::sound().with("timeouts", &[N], Values::I32(vec![1; ROWS]));
     assert_eq!(fault(wide), Fault::UnsupportedType { key: Key::Timeouts, found: "i32".to_owned() });
+}
+
+/// One byte a value, and two in the base type: it has no meaning, and the HDF5 library never writes it.
+#[test]
+fn an_enumeration_that_contradicts_itself() {
+    let table = Table::sound().with("timeouts", &[N], Values::TornEnum(vec![0; ROWS]));
+    let Fault::Damaged { reason } = fault(table) else { panic!() };
+    assert!(reason.starts_with("`timeouts`: "), "{reason}");
+}
+
+/// `small.py` wrote seven data sets of 2^40 rows and no values.
+#[test]
+fn more_rows_than_the_file_can_hold() {
+    let report = check(&fixture("claims.hdf5"));
+    assert_eq!(report.faults.len(), 7);
+    for fault in report.faults {
+        assert!(fault.to_string().contains("more than the file can hold"), "{fault}");
+    }
 }
 
 #[test]
@@ -261,7 +291,9 @@ fn what_a_sound_file_is_warned_of() {
 fn a_file_name_of_the_published_form_is_held_to_its_facts() {
     let warnings = |name| report(Table::sound(), name).warnings;
     assert_eq!(warnings("SafetyBallRun-v0-3-2.hdf5"), []);
-    assert_eq!(warnings("my-run-80-940.hdf5"), []);
+    for other in ["my-run-80-940.hdf5", "my-video-80-940.hdf5", "SafetyBallRun-v0-80.hdf5"] {
+        assert_eq!(warnings(other), [], "{other}");
+    }
     assert_eq!(
         warnings("SafetyBallRun-v0-80-940.hdf5"),
         [Warning::NamedTrajectories { named: 940, found: 2 }, Warning::NamedMaxCost { named: 80.0, found: 3.0 },]

@@ -47,7 +47,7 @@ fn states_have_the_moments_of_an_independent_program() {
         assert_eq!(moments.mean[entry], mean[entry] as f32);
         assert_eq!(moments.std[entry], std[entry] as f32);
     }
-    // The ball's height above ground: 5e-14 in size.
+    // The last entry is rounding noise around 0, of 5e-14.
     assert_eq!((moments.std[6], moments.constant), (1.0, vec![6]));
 }
 

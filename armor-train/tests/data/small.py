@@ -1,4 +1,5 @@
-"""Writes small.hdf5: the DSRL layout as h5py writes it, small enough to damage every byte of.
+"""Writes small.hdf5, the DSRL layout as h5py writes it, small enough to damage every byte of,
+and claims.hdf5, whose seven data sets claim 2^40 rows but hold none.
 
 Needs h5py and numpy (written with 3.16.0 and 1.26.4). Run in this folder: python3 small.py
 """
@@ -27,3 +28,7 @@ with h5py.File("small.hdf5", "w") as file:
     }
     for name, values in columns.items():
         file.create_dataset(name, data=values, compression="gzip", chunks=True)
+
+with h5py.File("claims.hdf5", "w", libver="latest") as file:
+    for name, values in columns.items():
+        file.create_dataset(name, shape=(2**40, *values.shape[1:]), dtype=values.dtype, chunks=(1024, *values.shape[1:]))

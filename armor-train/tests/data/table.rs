@@ -2,13 +2,15 @@
 
 use std::path::{Path, PathBuf};
 
-use hdf5_pure::{Datatype, DatatypeByteOrder, EnumTypeBuilder, FileBuilder, make_f32_type, make_i8_type};
+use hdf5_pure::{
+    Datatype, DatatypeByteOrder, EnumTypeBuilder, FileBuilder, make_f32_type, make_i8_type, make_i16_type,
+};
 
 /// Rows of [`Table::sound`]; its two trajectories end at rows 2 and 5.
-pub const ROWS: usize = 6;
+pub(crate) const ROWS: usize = 6;
 
 /// Values of a data set and the type that they are stored as.
-pub enum Values {
+pub(crate) enum Values {
     F32(Vec<f32>),
     F64(Vec<f64>),
     F32BigEndian(Vec<f32>),
@@ -17,15 +19,17 @@ pub enum Values {
     I32(Vec<i32>),
     /// As h5py writes numpy's bool.
     Bool(Vec<bool>),
+    /// An enumeration of one byte a value over a base type of two.
+    TornEnum(Vec<u8>),
     Text(Vec<&'static str>),
 }
 
 /// The data sets of a file: name, shape, values.
-pub struct Table(Vec<(&'static str, Vec<u64>, Values)>);
+pub(crate) struct Table(Vec<(&'static str, Vec<u64>, Values)>);
 
 impl Table {
     /// Three state entries, two action entries, no fault, no warning.
-    pub fn sound() -> Self {
+    pub(crate) fn sound() -> Self {
         let state = |t: usize| [t as f32, 0.5 * t as f32, -(t as f32)];
         let flags = |end: usize| (0..ROWS).map(|row| row == end).collect();
         let n = ROWS as u64;
@@ -41,25 +45,32 @@ impl Table {
     }
 
     /// Replaces a data set.
-    pub fn with(mut self, name: &'static str, shape: &[u64], values: Values) -> Self {
+    pub(crate) fn with(mut self, name: &'static str, shape: &[u64], values: Values) -> Self {
         self.0.retain(|(other, ..)| *other != name);
         self.0.push((name, shape.to_vec(), values));
         self
     }
 
     /// Replaces a single column of f32.
-    pub fn with_column(self, name: &'static str, values: &[f32]) -> Self {
+    pub(crate) fn with_column(self, name: &'static str, values: &[f32]) -> Self {
         self.with(name, &[values.len() as u64], Values::F32(values.to_vec()))
     }
 
     /// Leaves a data set out.
-    pub fn without(mut self, name: &str) -> Self {
+    pub(crate) fn without(mut self, name: &str) -> Self {
         self.0.retain(|(other, ..)| *other != name);
         self
     }
 
     /// Writes the file.
-    pub fn write(&self, folder: &Path, name: &str) -> PathBuf {
+    pub(crate) fn write(&self, folder: &Path, name: &str) -> PathBuf {
+        let path = folder.join(name);
+        self.build().write(&path).unwrap();
+        path
+    }
+
+    /// The file, to add more to.
+    pub(crate) fn build(&self) -> FileBuilder {
         let mut file = FileBuilder::new();
         for (name, shape, values) in &self.0 {
             let data = file.create_dataset(name);
@@ -78,13 +89,15 @@ impl Table {
                     let bytes = values.iter().map(|&value| u8::from(value)).collect();
                     data.with_raw_data(bool.build().unwrap(), bytes, values.len() as u64)
                 }
+                Values::TornEnum(values) => {
+                    let torn = Datatype::Enumeration { size: 1, base_type: Box::new(make_i16_type()), members: vec![] };
+                    data.with_raw_data(torn, values.clone(), values.len() as u64)
+                }
                 Values::Text(values) => data.with_strings(values).unwrap(),
             };
             data.with_shape(shape);
         }
-        let path = folder.join(name);
-        file.write(&path).unwrap();
-        path
+        file
     }
 }
 

@@ -1,0 +1,90 @@
+//! `armor-train data ...`
+
+use std::path::{Path, PathBuf};
+
+use armor_core::units::CostLimit;
+use firmware_sim::calibrate::{Calibration, CalibrationReport, Transition};
+use firmware_sim::cli::output::{CommandResult, Output};
+use firmware_sim::task::Task;
+
+use crate::config::Preset;
+use crate::data::{self, Dataset, Stats};
+
+/// Look at recorded data.
+#[derive(Debug, clap::Subcommand)]
+pub(super) enum Data {
+    /// Count a file: the paper's Table 1 and the spread of returns.
+    Stats {
+        /// An HDF5 file in the DSRL layout.
+        file: PathBuf,
+        /// Cost limit of an episode.
+        #[arg(long, value_name = "D", value_parser = super::limit)]
+        limit: CostLimit,
+        /// Weight of feasible trajectories (Eq. 6), for the mass they get.
+        #[arg(long, default_value_t = Preset::Paper.config("", 0.0).beta)]
+        beta: f64,
+    },
+    /// Name every fault of a file.
+    Check {
+        /// An HDF5 file in the DSRL layout.
+        file: PathBuf,
+    },
+    /// Compare a native plant with a recording of its simulator.
+    Calibrate {
+        /// An HDF5 file in the DSRL layout.
+        file: PathBuf,
+        /// The native task.
+        #[arg(long, value_parser = Task::named)]
+        task: &'static Task,
+    },
+}
+
+impl Data {
+    pub(super) fn run(self, output: Output) -> CommandResult {
+        match self {
+            Self::Stats { file, limit, beta } => {
+                if !(beta.is_finite() && beta >= 0.0) {
+                    return Err("--beta must be a number of at least 0".into());
+                }
+                let data = read(&file, output)?;
+                output.report(&Stats::new(&data, limit, beta))
+            }
+            Self::Check { file } => {
+                let report = data::check(&file);
+                output.report(&report)?;
+                if report.is_sound() {
+                    Ok(())
+                } else {
+                    Err(format!("{} cannot be used: {} faults, named above", file.display(), report.faults.len())
+                        .into())
+                }
+            }
+            Self::Calibrate { file, task } => output.report(&calibrate(&read(&file, output)?, task)?),
+        }
+    }
+}
+
+/// Reads a file, and tells what is odd about it.
+pub(super) fn read(file: &Path, output: Output) -> Result<Dataset, data::DataError> {
+    let data = Dataset::read(file)?;
+    for warning in data::Warning::all(&data, file) {
+        output.note(format_args!("warning: {warning}"));
+    }
+    Ok(data)
+}
+
+/// Feeds all transitions to the plant of `task`.
+pub(super) fn calibrate(data: &Dataset, task: &'static Task) -> Result<CalibrationReport, Box<dyn std::error::Error>> {
+    let mut calibration = Calibration::new(task)?;
+    for row in 0..data.len() {
+        calibration.push(&Transition {
+            first: data.trajectories()[data.trajectory(row)].rows.start == row,
+            observation: data.observation(row),
+            action: data.action(row),
+            reward: data.reward(row),
+            cost: data.cost(row),
+            next_observation: data.next_observation(row),
+        })?;
+    }
+    Ok(calibration.report())
+}

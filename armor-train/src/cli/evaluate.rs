@@ -1,0 +1,69 @@
+//! `armor-train evaluate`
+
+use std::fmt;
+use std::path::PathBuf;
+
+use armor_core::image::PolicyImage;
+use armor_core::units::CostLimit;
+use firmware_sim::cli::output::{CommandResult, Output};
+use firmware_sim::flight::{FlightPlan, fly};
+use firmware_sim::summary::FlightSummary;
+use firmware_sim::task::Task;
+use serde::Serialize;
+
+/// Fly a policy on a task and report normalised reward and cost (Eq. 17).
+///
+/// What flies is the image that would be deployed, on the same controller.
+#[derive(Debug, clap::Args)]
+pub(super) struct Evaluate {
+    /// Folder of a run, or an image.
+    policy: PathBuf,
+    /// The task to fly.
+    #[arg(long, value_parser = Task::named)]
+    task: &'static Task,
+    /// Cost limits, as in 5,10,20; the paper's limit for the task, if not given.
+    #[arg(long, value_name = "D", value_delimiter = ',', value_parser = super::limit)]
+    limit: Vec<CostLimit>,
+    /// Episodes at each limit.
+    #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..))]
+    episodes: u32,
+    /// Decides the starts and the noise.
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    /// The run's recorded data, if it was moved.
+    #[arg(long)]
+    data: Option<PathBuf>,
+}
+
+#[derive(Serialize)]
+struct Report {
+    policy: PathBuf,
+    flights: Vec<FlightSummary>,
+}
+
+impl Evaluate {
+    pub(super) fn run(self, output: Output) -> CommandResult {
+        let task = self.task;
+        task.plant()?;
+        let bytes = super::run_folder::image(&self.policy, self.data.as_ref(), output)?;
+        let image = PolicyImage::new_checked(bytes.as_slice())
+            .map_err(|error| format!("{}: {error}", self.policy.display()))?;
+        let limits = if self.limit.is_empty() { vec![CostLimit::new(task.cost_limit)?] } else { self.limit };
+        let mut flights = Vec::new();
+        for limit in limits {
+            let plan = FlightPlan { task, limit, episodes: self.episodes, seed: self.seed, rate_hz: task.rate_hz };
+            flights.push(fly(&image, &plan)?.summary);
+        }
+        output.report(&Report { policy: self.policy, flights })
+    }
+}
+
+impl fmt::Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "policy              {}", self.policy.display())?;
+        for flight in &self.flights {
+            write!(f, "\n\n{flight}")?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,66 @@
+//! The command line: `armor-train COMMAND`.
+
+mod data;
+mod evaluate;
+mod export;
+mod fit;
+mod progress;
+mod quickstart;
+mod run_folder;
+
+use std::process::ExitCode;
+
+use armor_core::units::CostLimit;
+use clap::{Parser, Subcommand};
+use firmware_sim::cli::output::{self, Output};
+
+/// Learn a safe robot policy from recorded data, and export it for a microcontroller.
+#[derive(Debug, Parser)]
+#[command(name = "armor-train", version, max_term_width = 80)]
+struct Cli {
+    /// Print one JSON object as the last line of stdout, and nothing else there.
+    #[arg(long, global = true)]
+    json: bool,
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Quickstart(quickstart::Quickstart),
+    #[command(subcommand)]
+    Data(data::Data),
+    Fit(fit::Fit),
+    Export(export::Export),
+    Evaluate(evaluate::Evaluate),
+}
+
+/// Runs the command of the process's arguments.
+pub fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let output = Output::new(cli.json);
+    output::exit(match cli.command {
+        Command::Quickstart(command) => command.run(output),
+        Command::Data(command) => command.run(output),
+        Command::Fit(command) => command.run(output),
+        Command::Export(command) => command.run(output),
+        Command::Evaluate(command) => command.run(output),
+    })
+}
+
+/// A cost limit as an argument.
+fn limit(text: &str) -> Result<CostLimit, Box<dyn std::error::Error + Send + Sync>> {
+    Ok(CostLimit::new(text.parse()?)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    use super::*;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Cli::command().debug_assert();
+    }
+}

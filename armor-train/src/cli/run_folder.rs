@@ -1,0 +1,42 @@
+//! A run's folder, or an image file, as an argument.
+
+use std::path::{Path, PathBuf};
+
+use firmware_sim::cli::output::Output;
+use firmware_sim::memory::AlignedBytes;
+
+use crate::data::Dataset;
+use crate::export::{Exported, export};
+use crate::run::{Checkpoint, RunError};
+
+/// The policy of the last checkpoint in `folder`, exported in memory; `data`
+/// says where the recorded data is now, if it was moved.
+pub(super) fn export_folder(
+    folder: &Path,
+    data: Option<&PathBuf>,
+    output: Output,
+) -> Result<(Checkpoint, Exported), Box<dyn std::error::Error>> {
+    let checkpoint = Checkpoint::read(folder)?;
+    let path = data.cloned().unwrap_or_else(|| PathBuf::from(&checkpoint.config.data));
+    let data = super::data::read(&path, output)
+        .map_err(|error| format!("{error}; name the run's recorded data with --data if it was moved"))?;
+    same_data(&checkpoint, &data, folder)?;
+    let exported = export(&checkpoint, &data)?;
+    Ok((checkpoint, exported))
+}
+
+fn same_data(checkpoint: &Checkpoint, data: &Dataset, folder: &Path) -> Result<(), RunError> {
+    if checkpoint.data_sha256 == *data.sha256() {
+        return Ok(());
+    }
+    Err(RunError::OtherData { folder: folder.into() })
+}
+
+/// The image in a file, or of a run's folder.
+pub(super) fn image(
+    path: &Path,
+    data: Option<&PathBuf>,
+    output: Output,
+) -> Result<AlignedBytes, Box<dyn std::error::Error>> {
+    if path.is_dir() { Ok(export_folder(path, data, output)?.1.bytes) } else { Ok(AlignedBytes::read(path)?) }
+}

@@ -1,0 +1,105 @@
+//! Makes the image, measures it, and makes it again with what was measured.
+
+use armor_core::image::{KappaRange, Manifest, PolicyImage, Precision, Provenance, Rung, SECTION_COUNT, write};
+use armor_core::schedule::Sampler;
+use armor_core::shape::Shape;
+use armor_core::units::{Cost, CostLimit};
+use armor_infer::Policy;
+use sha2::{Digest, Sha256};
+
+use super::agreement::{AGREEMENT_BOUND, Agreement, agreement};
+use super::sections::sections;
+use super::{ExportError, ImageBytes, golden};
+use crate::actor::Actor;
+use crate::config::Config;
+use crate::data::Dataset;
+use crate::model::Model;
+use crate::normaliser::Normaliser;
+use crate::run::Checkpoint;
+
+/// Bytes of an image beyond its sections: header, manifest and padding are far below.
+const OVERHEAD: usize = 4096;
+
+/// An image with what was measured on it.
+#[derive(Clone, Debug)]
+pub struct Exported {
+    /// The image.
+    pub bytes: ImageBytes,
+    /// How far its actions are from the trainer's.
+    pub agreement: Agreement,
+}
+
+/// The image of a checkpoint's actor in f32.
+///
+/// # Errors
+/// [`ExportError`]
+pub fn export(checkpoint: &Checkpoint, data: &Dataset) -> Result<Exported, ExportError> {
+    let config = &checkpoint.config;
+    let actor = Model::new(config, data.state_dim(), data.action_dim()).actor;
+    let parameters = &checkpoint.state.parameters.actor[..];
+    let normaliser = Normaliser::new(data, config.normalize_states);
+    let manifest = manifest(checkpoint, &actor, data);
+
+    // A trace without rows, to have an image that the controller can fly.
+    let draft = build(&manifest, &sections(&actor, parameters, &normaliser, &[0; 4]))?;
+    let image = PolicyImage::new_checked(draft.as_slice()).map_err(armor_core::image::WriteError::Invalid)?;
+    let policy = Policy::load(&image)?;
+    let limit = flyable_limit(config, &manifest);
+    let trace = golden::record(policy, data, limit, config.seed)?;
+    let agreement = agreement((&actor, parameters, config.cost_scale), &normaliser, policy, data)?;
+    if agreement.agreement_max_abs > AGREEMENT_BOUND {
+        return Err(ExportError::Disagreement { found: agreement.agreement_max_abs });
+    }
+
+    let manifest = Manifest { agreement_max_abs: agreement.agreement_max_abs, ..manifest };
+    let bytes = build(&manifest, &sections(&actor, parameters, &normaliser, &trace))?;
+    Ok(Exported { bytes, agreement })
+}
+
+/// The trained limit, or the largest budget of the data where that is smaller.
+fn flyable_limit(config: &Config, manifest: &Manifest<'_>) -> CostLimit {
+    let limit = CostLimit::new(config.limit as f32).map_or(Cost::MAX, CostLimit::cost);
+    CostLimit::from_cost(limit.min(manifest.kappa.trained_max))
+}
+
+fn manifest<'a>(checkpoint: &'a Checkpoint, actor: &Actor, data: &Dataset) -> Manifest<'a> {
+    let config = &checkpoint.config;
+    let widths = actor.denoiser.widths();
+    let shape = Shape {
+        state: widths.state as u16,
+        action: widths.action as u16,
+        hidden: widths.hidden as u16,
+        kappa_hidden: widths.kappa_hidden as u16,
+        kappa_embedding: widths.kappa_embedding as u16,
+        steps: widths.steps as u16,
+    };
+    Manifest {
+        task: &config.task,
+        shape,
+        precision: Precision::F32,
+        kappa: KappaRange {
+            scale: (config.cost_scale * config.kappa_scale) as f32,
+            trained_max: Cost::from_incurred(data.max_kappa()).unwrap_or(Cost::MAX),
+        },
+        schedule: actor.schedule,
+        rungs: [Rung { sampler: Sampler::Ddpm, steps: shape.steps }].into_iter().collect(),
+        provenance: Provenance {
+            version: env!("CARGO_PKG_VERSION"),
+            preset: config.preset.name(),
+            seed: config.seed,
+            steps: checkpoint.state.step,
+            data_sha256: checkpoint.data_sha256,
+            config_sha256: Sha256::digest(config.options().to_string()).into(),
+        },
+        agreement_max_abs: 0.0,
+        quality: Default::default(),
+        sections: Default::default(),
+    }
+}
+
+fn build(manifest: &Manifest<'_>, sections: &[Vec<u32>; SECTION_COUNT]) -> Result<ImageBytes, ExportError> {
+    let capacity = OVERHEAD + sections.iter().map(|words| (4 * words.len()).next_multiple_of(16)).sum::<usize>();
+    let mut bytes = ImageBytes::filled(0, capacity);
+    let length = write(manifest, &sections.each_ref().map(Vec::as_slice), bytes.as_mut_slice())?;
+    Ok(ImageBytes::from(&bytes.as_slice()[..length]))
+}

@@ -1,0 +1,45 @@
+//! From a run's checkpoint to a policy image.
+//!
+//! What the image says of itself is measured here, on the image: the golden
+//! trace is flown by the controller, and the agreement with the trainer's own
+//! forward pass is taken over recorded states and budgets.
+
+mod agreement;
+mod build;
+mod golden;
+mod sections;
+
+use armor_core::image::WriteError;
+use armor_infer::LoadError;
+use firmware_sim::memory::AlignedBytes;
+
+pub use agreement::{AGREEMENT_BOUND, AGREEMENT_SAMPLES, Agreement, agreement};
+pub use build::{Exported, export};
+
+/// Why a policy could not be exported.
+#[derive(Debug, thiserror::Error)]
+pub enum ExportError {
+    /// The numbers make no valid image.
+    #[error("the policy cannot be written: {0}")]
+    Write(#[from] WriteError),
+    /// The host's controller cannot hold the policy.
+    #[error("the policy is too large for the controller: {0}")]
+    Load(#[from] LoadError),
+    /// The controller met a fault while it flew the golden trace.
+    #[error("the exported policy fails on recorded states ({0}); train it again")]
+    Fault(armor_infer::Fault),
+    /// Trainer and image disagree.
+    #[error(
+        "trainer and image differ by {found:e} in an action, more than {AGREEMENT_BOUND:e}; this is a defect, please report it"
+    )]
+    Disagreement {
+        /// The largest difference.
+        found: f32,
+    },
+    /// The data has no trajectory.
+    #[error("the data has no trajectory to take a golden trace from")]
+    NoTrajectory,
+}
+
+/// An image in memory, at an aligned address.
+pub(crate) type ImageBytes = AlignedBytes;

@@ -1,0 +1,98 @@
+//! The file that a run goes on from.
+
+use std::path::Path;
+
+use firmware_sim::file;
+use serde::{Deserialize, Serialize};
+
+use super::RunError;
+use super::metrics::Window;
+use crate::config::Config;
+use crate::learner::LearnerState;
+
+/// The first bytes of a checkpoint, with its version.
+const MAGIC: &[u8; 8] = b"ARMRCK01";
+const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
+
+/// A run at one moment.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Checkpoint {
+    /// The effective configuration.
+    pub config: Config,
+    /// SHA-256 of the recorded data.
+    pub data_sha256: [u8; 32],
+    /// Networks, optimisers and weights.
+    pub state: LearnerState<f32>,
+    /// Metrics since the last row of `metrics.csv`.
+    pub window: Window,
+}
+
+impl Checkpoint {
+    /// Name of the file within a run's folder.
+    pub const FILE: &str = "checkpoint.postcard";
+
+    /// The last checkpoint of the run in `folder`.
+    ///
+    /// # Errors
+    /// [`RunError::File`] and [`RunError::Checkpoint`].
+    pub fn read(folder: &Path) -> Result<Self, RunError> {
+        let path = folder.join(Self::FILE);
+        let bytes = file::read(&path)?;
+        Self::decode(&bytes).ok_or(RunError::Checkpoint { path })
+    }
+
+    fn decode(bytes: &[u8]) -> Option<Self> {
+        let body = bytes.strip_prefix(MAGIC)?;
+        postcard::from_bytes_crc32(body, CRC.digest()).ok()
+    }
+
+    /// Writes the checkpoint, whole or not at all.
+    ///
+    /// # Errors
+    /// [`RunError::File`]; the checkpoint before is kept then.
+    pub fn write(&self, folder: &Path) -> Result<(), RunError> {
+        let path = folder.join(Self::FILE);
+        let body =
+            postcard::to_stdvec_crc32(self, CRC.digest()).map_err(|_| RunError::Checkpoint { path: path.clone() })?;
+        Ok(file::write(&path, &[&MAGIC[..], &body].concat())?)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::Preset;
+    use crate::model::{Model, Optimisers};
+    use armor_core::noise::Noise;
+
+    fn checkpoint() -> Checkpoint {
+        let mut config = Preset::Quick.config("ball-run", 5.0);
+        (config.hidden, config.trunk, config.head, config.dual_hidden) = (4, 4, 4, 4);
+        let parameters = Model::new(&config, 3, 2).initialise(Noise::new(1));
+        let optimisers = Optimisers::new(&config, &parameters);
+        let state = LearnerState { step: 7, parameters, optimisers, counterfactual: vec![1.0, 1.5] };
+        Checkpoint { config, data_sha256: [3; 32], state, window: Window::default() }
+    }
+
+    #[test]
+    fn what_is_written_is_read_back() {
+        let folder = tempfile::tempdir().unwrap();
+        checkpoint().write(folder.path()).unwrap();
+        assert_eq!(Checkpoint::read(folder.path()).unwrap(), checkpoint());
+    }
+
+    #[test]
+    fn every_flipped_byte_and_every_cut_is_noticed() {
+        let folder = tempfile::tempdir().unwrap();
+        checkpoint().write(folder.path()).unwrap();
+        let bytes = std::fs::read(folder.path().join(Checkpoint::FILE)).unwrap();
+        for index in 0..bytes.len() {
+            let mut damaged = bytes.clone();
+            damaged[index] ^= 0x40;
+            assert!(Checkpoint::decode(&damaged).is_none(), "flip at {index}");
+        }
+        for length in (0..bytes.len()).step_by(7) {
+            assert!(Checkpoint::decode(&bytes[..length]).is_none(), "cut at {length}");
+        }
+    }
+}

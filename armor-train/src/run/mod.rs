@@ -1,0 +1,122 @@
+//! A training run and its folder.
+//!
+//! ```text
+//! DIR/config.toml           the effective configuration
+//! DIR/metrics.csv           one row every 100 steps
+//! DIR/checkpoint.postcard   all that changes from step to step
+//! ```
+//!
+//! Every file is written aside and renamed, the checkpoint last: after a kill
+//! at any moment the folder holds the last whole checkpoint, and a resumed run
+//! has the bits of one never stopped.
+
+mod checkpoint;
+mod fit;
+mod metrics;
+
+use std::path::PathBuf;
+
+use firmware_sim::file::FileError;
+
+use crate::config::{Config, ConfigError};
+use crate::data::{DataError, Dataset};
+
+pub use checkpoint::Checkpoint;
+pub use fit::{Outcome, Watch, fit};
+pub use metrics::{COLUMNS, Window};
+
+/// Why a run cannot start, go on, or be read.
+#[derive(Debug, thiserror::Error)]
+pub enum RunError {
+    /// A file could not be read or written.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// The folder could not be made.
+    #[error("cannot make the folder {}: {source}", folder.display())]
+    Folder {
+        /// The folder.
+        folder: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The recorded data cannot be used.
+    #[error(transparent)]
+    Data(#[from] DataError),
+    /// The configuration cannot be used.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// The data has not the sizes of the task.
+    #[error(
+        "the data has {state} state and {action} action entries, but {task} has {expected_state} and {expected_action}; name the task that was recorded"
+    )]
+    Sizes {
+        /// The task.
+        task: String,
+        /// State entries of the data.
+        state: usize,
+        /// Action entries of the data.
+        action: usize,
+        /// State entries of the task.
+        expected_state: usize,
+        /// Action entries of the task.
+        expected_action: usize,
+    },
+    /// The folder already holds a run.
+    #[error("{} already holds a run; add --resume to go on with it, or choose another --out", folder.display())]
+    Taken {
+        /// The folder.
+        folder: PathBuf,
+    },
+    /// There is nothing to go on with.
+    #[error("{} holds no checkpoint; leave out --resume to start a run there", folder.display())]
+    NothingToResume {
+        /// The folder.
+        folder: PathBuf,
+    },
+    /// The checkpoint is damaged or not one.
+    #[error("{} is no whole checkpoint of this version; restore a copy, or start the run anew", path.display())]
+    Checkpoint {
+        /// The checkpoint.
+        path: PathBuf,
+    },
+    /// The checkpoint comes from another configuration.
+    #[error("the run in {} has another `{key}`; resume it with the options it was started with", folder.display())]
+    OtherConfig {
+        /// The folder.
+        folder: PathBuf,
+        /// The first option that differs.
+        key: String,
+    },
+    /// The checkpoint comes from other data.
+    #[error("the run in {} was started with other data; resume it with the file it was started with", folder.display())]
+    OtherData {
+        /// The folder.
+        folder: PathBuf,
+    },
+    /// A loss is no longer a number.
+    #[error(
+        "training diverged at step {step}: a loss is not finite; the last checkpoint is kept (try a smaller critic_rate)"
+    )]
+    Diverged {
+        /// The step.
+        step: u64,
+    },
+}
+
+/// Whether data has the sizes of the task that a configuration names.
+///
+/// # Errors
+/// [`RunError::Sizes`]. A name that is no task of the table is the user's own, and has any size.
+pub fn check_sizes(config: &Config, data: &Dataset) -> Result<(), RunError> {
+    let Ok(task) = firmware_sim::task::Task::named(&config.task) else { return Ok(()) };
+    if (task.state, task.action) == (data.state_dim(), data.action_dim()) {
+        return Ok(());
+    }
+    Err(RunError::Sizes {
+        task: config.task.clone(),
+        state: data.state_dim(),
+        action: data.action_dim(),
+        expected_state: task.state,
+        expected_action: task.action,
+    })
+}

@@ -1,0 +1,83 @@
+//! The command line: `firmware-sim COMMAND`.
+
+mod bench;
+mod flash;
+mod inspect;
+pub mod output;
+mod run;
+mod trace;
+mod verify;
+
+use std::process::ExitCode;
+
+use armor_core::schedule::Sampler;
+use armor_core::units::CostLimit;
+use clap::{Parser, Subcommand};
+
+use crate::task::{Task, TaskError};
+use output::Output;
+
+/// Inspect, verify, flash and fly ARMOR policy images.
+#[derive(Debug, Parser)]
+#[command(name = "firmware-sim", version, max_term_width = 80)]
+struct Cli {
+    /// Print one JSON object as the last line of stdout, and nothing else there.
+    #[arg(long, global = true)]
+    json: bool,
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Inspect(inspect::Inspect),
+    Verify(verify::Verify),
+    Trace(trace::Trace),
+    Flash(flash::Flash),
+    Run(run::Run),
+    Bench(bench::Bench),
+}
+
+/// Runs the command of the process's arguments.
+pub fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let output = Output::new(cli.json);
+    output::exit(match cli.command {
+        Command::Inspect(command) => command.run(output),
+        Command::Verify(command) => command.run(output),
+        Command::Trace(command) => command.run(output),
+        Command::Flash(command) => command.run(output),
+        Command::Run(command) => command.run(output),
+        Command::Bench(command) => command.run(output),
+    })
+}
+
+/// A task's name as an argument.
+fn task(name: &str) -> Result<&'static Task, TaskError> {
+    Task::named(name)
+}
+
+/// A cost limit as an argument.
+fn limit(text: &str) -> Result<CostLimit, Box<dyn std::error::Error + Send + Sync>> {
+    Ok(CostLimit::new(text.parse()?)?)
+}
+
+/// A sampler as reports write it.
+const fn sampler_name(sampler: Sampler) -> &'static str {
+    match sampler {
+        Sampler::Ddpm => "DDPM",
+        Sampler::Ddim => "DDIM",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    use super::*;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Cli::command().debug_assert();
+    }
+}

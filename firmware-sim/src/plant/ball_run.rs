@@ -1,0 +1,125 @@
+//! `ball-run`, the task of SafetyBallRun-v0: run along x, not too fast, between two lines.
+//!
+//! Constants are those of bullet-safety-gym 1.4.0 (`envs/tasks.py`, `RunTask`;
+//! `envs/agents.py`, `Ball`; `envs/builder.py`).
+
+use armor_core::noise::{Noise, uniform};
+use nalgebra::Vector2;
+
+use super::rolling_ball::RollingBall;
+use super::{Outcome, Plant};
+
+/// Sub-steps that an action is held for (`frame_skip`): 1/30 s.
+const SUBSTEPS: usize = 4;
+/// Force of a full action in N.
+const FORCE: f64 = 3.5;
+/// The start is drawn uniformly within this distance of the origin, in x and in y, in m.
+const START: f64 = 0.01;
+/// Beyond this |y|, in m, a step costs 1.
+const Y_LIMIT: f64 = 2.0;
+/// Beyond this planar speed, in m/s, a step costs 1.
+const SPEED_LIMIT: f64 = 2.5;
+/// The goal lies here on the x axis, in m, and is never reached.
+const GOAL: f64 = 1000.0;
+/// Reward per metre towards the goal.
+const PROGRESS_REWARD: f64 = 60.0;
+/// Price of an action of length 1.
+const ACTION_PRICE: f64 = 0.5;
+/// Factor of the position in the observation.
+const POSITION: f64 = 0.1;
+/// Factor of the velocity in the observation.
+const VELOCITY: f64 = 0.2;
+/// Factor of the spin in the observation.
+const SPIN: f64 = 0.1;
+
+/// The ball on its run.
+///
+/// It observes `0.1 (x, y)`, `0.2 (vx, vy)` and `0.1 (wx, wy, wz)`; `wz` is 0.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BallRun {
+    ball: RollingBall,
+}
+
+impl Default for BallRun {
+    /// The ball at rest at the origin.
+    fn default() -> Self {
+        Self { ball: RollingBall::at_rest(Vector2::zeros()) }
+    }
+}
+
+impl BallRun {
+    /// Entries of the observation.
+    pub const STATE: usize = 7;
+    /// Entries of the action.
+    pub const ACTION: usize = 2;
+
+    /// Minus the distance to the goal, in units of reward.
+    fn potential(&self) -> f64 {
+        -(self.ball.position - Vector2::new(GOAL, 0.0)).norm() * PROGRESS_REWARD
+    }
+}
+
+impl Plant for BallRun {
+    fn state_dim(&self) -> usize {
+        Self::STATE
+    }
+
+    fn action_dim(&self) -> usize {
+        Self::ACTION
+    }
+
+    /// The simulator idles for one step after it has stored the potential.
+    /// A resting ball stays where it is, so there is nothing to do here: in the
+    /// recordings the first reward is that of the way from the first
+    /// observation on.
+    fn reset(&mut self, seed: u64) {
+        let [x, y, ..] = Noise::new(seed).words(0, 0, 0);
+        let start = |word| START * (2.0 * f64::from(uniform(word)) - 1.0);
+        self.ball = RollingBall::at_rest(Vector2::new(start(x), start(y)));
+    }
+
+    fn observe(&self, state: &mut [f32]) {
+        let RollingBall { position, velocity, spin } = self.ball;
+        let observation = [
+            POSITION * position.x,
+            POSITION * position.y,
+            VELOCITY * velocity.x,
+            VELOCITY * velocity.y,
+            SPIN * spin.x,
+            SPIN * spin.y,
+            0.0,
+        ];
+        for (entry, value) in state.iter_mut().zip(observation) {
+            *entry = value as f32;
+        }
+    }
+
+    fn step(&mut self, action: &[f32]) -> Outcome {
+        let entry = |i: usize| action.get(i).map_or(0.0, |a| f64::from(a.clamp(-1.0, 1.0)));
+        let action = Vector2::new(entry(0), entry(1));
+        let before = self.potential();
+        for _ in 0..SUBSTEPS {
+            self.ball.substep(FORCE * action);
+        }
+        let reward = self.potential() - before - ACTION_PRICE * action.norm();
+        Outcome { reward, cost: self.cost(), done: false }
+    }
+
+    fn set_observation(&mut self, observation: &[f32]) {
+        let entry = |i: usize| observation.get(i).copied().map_or(0.0, f64::from);
+        self.ball = RollingBall {
+            position: Vector2::new(entry(0), entry(1)) / POSITION,
+            velocity: Vector2::new(entry(2), entry(3)) / VELOCITY,
+            spin: Vector2::new(entry(4), entry(5)) / SPIN,
+        };
+    }
+
+    fn cost(&self) -> f64 {
+        let outside = self.ball.position.y.abs() > Y_LIMIT;
+        let too_fast = self.ball.velocity.norm() > SPEED_LIMIT;
+        if outside || too_fast { 1.0 } else { 0.0 }
+    }
+}
+
+#[cfg(test)]
+mod tests;
