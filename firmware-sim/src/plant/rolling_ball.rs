@@ -169,6 +169,18 @@ mod tests {
         close(ball.velocity.x, expected, 1e-9);
     }
 
+    /// Below the limit of rolling friction an iteration stops the spin, and the
+    /// sliding friction after it leaves `1 / (1 + 2/5)` of the speed.
+    #[test]
+    fn a_nearly_resting_ball_keeps_five_sevenths_of_its_speed_an_iteration() {
+        for (speed, iterations) in [(2e-3, 5), (1e-4, 2)] {
+            let mut ball = rolling(speed, 0.0);
+            ball.substep(Vector2::zeros());
+            let damped = speed - SUBSTEP * 0.04 * speed * (1.0 + speed);
+            close(ball.velocity.x / damped, (5.0f64 / 7.0).powi(iterations), 1e-5);
+        }
+    }
+
     #[test]
     fn the_largest_push_makes_no_ball_slip() {
         for speed in [0.0, 2.5, 12.0] {

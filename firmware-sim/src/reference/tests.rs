@@ -1,0 +1,82 @@
+use armor_core::image::SectionKind;
+use armor_core::schedule::VpSchedule;
+use armor_core::units::CostLimit;
+use armor_infer::Policy;
+
+use super::*;
+use crate::fixture::{BALL_RUN, Parts};
+use crate::host::HostController;
+use crate::memory::AlignedBytes;
+
+const SEED: u64 = 5;
+const STATE: [f32; 7] = [0.1, -0.2, 0.5, 0.0, 0.3, -0.7, 0.2];
+
+fn with_image<T>(parts: &Parts, act: impl FnOnce(&PolicyImage<'_>) -> T) -> T {
+    let memory = AlignedBytes::from(parts.bytes().as_slice());
+    act(&PolicyImage::new_checked(memory.as_slice()).unwrap())
+}
+
+#[test]
+fn it_agrees_with_the_controller_to_single_precision() {
+    for seed in 0..20 {
+        with_image(&Parts::random("ball-run", BALL_RUN, seed), |image| {
+            let limit = CostLimit::new(7.0).unwrap();
+            let mut controller = HostController::new(Policy::load(image).unwrap(), limit, SEED).unwrap();
+            let reference = Reference::new(image);
+            for tick in 0..5 {
+                let step = controller.step(&STATE, 1.0);
+                let chain = reference.chain(step.rung, &STATE, step.kappa, SEED, tick);
+                for (entry, expected) in step.action.iter().zip(chain.action) {
+                    assert!((f64::from(*entry) - expected).abs() < 2e-5, "{entry} is not {expected}");
+                }
+            }
+        });
+    }
+}
+
+/// A network that always says `eps = 0.5`: the deterministic chain keeps
+/// its first estimate, `(a^N - sqrt(1 - abar_N) / 2) / sqrt(abar_N)`, clipped.
+#[test]
+fn the_deterministic_chain_of_a_constant_network_has_a_closed_form() {
+    let mut parts = Parts::random("ball-run", BALL_RUN, 1);
+    let output = parts.section(SectionKind::Output);
+    let biases = output.len() - 2;
+    output.fill(0);
+    output[biases..].fill(0.5f32.to_bits());
+    let bounds = [-1e3f32, 1e3, 0.0].map(|bound| [bound.to_bits(); 2]);
+    *parts.section(SectionKind::ActionBounds) = bounds.concat();
+    let chain = with_image(&parts, |image| Reference::new(image).chain(1, &STATE, Cost::ZERO, SEED, 3));
+    let mut start = [0.0; 2];
+    Noise::new(SEED).fill_normal(0, 3, &mut start);
+    let abar = VpSchedule::new(5).alpha_bar(5);
+    for (entry, start) in start.into_iter().map(f64::from).enumerate() {
+        let expected = (start - 0.5 * (1.0 - abar).sqrt()) / abar.sqrt();
+        assert!((chain.action[entry] - expected).abs() < 1e-5 * expected.abs(), "{chain:?}");
+        assert_eq!(chain.start[entry], start);
+    }
+    assert_eq!(chain.steps.iter().map(|step| step.n).collect::<Vec<_>>(), [5, 3]);
+    assert!(chain.steps.iter().all(|step| step.eps == [0.5; 2] && step.noise == [0.0; 2]));
+}
+
+#[test]
+fn each_row_follows_from_the_one_before_by_eq_12() {
+    let parts = Parts::random("ball-run", BALL_RUN, 1);
+    let chain = with_image(&parts, |image| Reference::new(image).chain(0, &STATE, Cost::ZERO, SEED, 0));
+    let schedule = VpSchedule::new(5);
+    let mut before = chain.start.clone();
+    for row in &chain.steps {
+        let (here, there) = (schedule.alpha_bar(row.n), schedule.alpha_bar(row.n - 1));
+        let beta = schedule.beta(row.n);
+        for (entry, before) in before.iter().enumerate() {
+            let estimate = (before - (1.0 - here).sqrt() * row.eps[entry]) / here.sqrt();
+            let x0 = estimate.clamp(-1.0, 1.0);
+            assert!((row.x0[entry] - x0).abs() < 1e-6);
+            let mean =
+                beta * there.sqrt() / (1.0 - here) * x0 + (1.0 - there) * (here / there).sqrt() / (1.0 - here) * before;
+            let sigma = (beta * (1.0 - there) / (1.0 - here)).sqrt();
+            assert!((row.action[entry] - mean - sigma * row.noise[entry]).abs() < 1e-6);
+        }
+        before.clone_from(&row.action);
+    }
+    assert_eq!(before, chain.action);
+}

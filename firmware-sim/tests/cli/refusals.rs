@@ -1,0 +1,92 @@
+//! What the commands refuse, and how.
+
+use super::*;
+
+#[test]
+fn wrong_arguments_are_bad_usage() {
+    let bench = Bench::flashed();
+    bench.misuse(&[]);
+    bench.misuse(&["fly"]);
+    bench.misuse(&["inspect"]);
+    bench.misuse(&["flash", "policy.armor"]);
+    bench.misuse(&["flash", "policy.armor", "--chip", "robot.chip", "--slot", "c"]);
+    assert!(bench.misuse(&["run", "--chip", "robot.chip", "--task", "ball-jump"]).contains("no task is called"));
+    assert!(bench.misuse(&[&RUN[..], &["--board", "mps2-an386"]].concat()).contains("possible values: host"));
+    for (option, value) in [("--limit", "-1"), ("--limit", "NaN"), ("--limit", "few"), ("--rate", "fast")] {
+        assert!(bench.misuse(&[&RUN[..], &[&format!("{option}={value}")]].concat()).contains(option));
+    }
+    bench.misuse(&["run", "--chip", "robot.chip", "--task", "ball-run", "--episodes", "0"]);
+}
+
+#[test]
+fn what_is_no_whole_image_is_refused_by_every_command_that_takes_one() {
+    let bench = Bench::new();
+    let image = fixture::ball_run(1);
+    bench.put("cut.armor", &image[..image.len() - 4]);
+    bench.put("other.armor", b"#!/bin/sh\necho this is no image at all\n");
+    bench.put("empty.armor", b"");
+    bench.put("state.txt", b"0 0 0 0 0 0 0");
+    for (name, message) in [
+        ("cut.armor", "image is cut short"),
+        ("other.armor", "not a policy image"),
+        ("empty.armor", "image is cut short"),
+        ("none.armor", "cannot read none.armor"),
+    ] {
+        for command in ["inspect", "bench", "flash", "trace"] {
+            let options: &[&str] = match command {
+                "flash" => &["--chip", "robot.chip"],
+                "trace" => &["--state", "state.txt", "--kappa", "1", "--seed", "1"],
+                _ => &[],
+            };
+            let error = bench.failure(&[&[command, name], options].concat());
+            assert!(error.contains(message) && error.contains(name), "{error}");
+        }
+    }
+    assert!(!bench.path("robot.chip").exists());
+    let output = bench.run(&["verify", "cut.armor"]);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(text(&output.stdout).starts_with("FAIL  image"));
+}
+
+#[test]
+fn a_flight_that_does_not_fit_is_refused() {
+    let bench = Bench::flashed();
+    let with = |options: &[&str]| bench.failure(&[&RUN[..], options].concat());
+    assert!(with(&["--rate", "7"]).contains("30 Hz or a whole fraction, not at 7"));
+    assert!(with(&["--limit", &(TRAINED_MAX + 1.0).to_string()]).contains("set a limit of at most 40"));
+    let simulator = ["run", "--chip", "robot.chip", "--task", "SafetyPointGoal1-v0"];
+    assert!(bench.failure(&simulator).contains("only native tasks fly so far; use ball-run"));
+
+    for (name, parts, message) in [
+        ("other-task", Parts::random("point-goal", BALL_RUN, 1), "trained for point-goal and not for ball-run"),
+        ("other-size", Parts::random("ball-run", Shape { state: 9, ..BALL_RUN }, 1), "senses 9 and moves 2 entries"),
+    ] {
+        bench.put(name, &parts.with_golden().bytes());
+        bench.json(&["flash", name, "--chip", "robot.chip"]);
+        assert!(bench.failure(&RUN).contains(message));
+    }
+}
+
+#[test]
+fn what_is_no_chip_is_refused() {
+    let bench = Bench::flashed();
+    let whole = fs::read(bench.path("robot.chip")).unwrap();
+    let refused = |bytes: &[u8]| {
+        bench.put("robot.chip", bytes);
+        bench.failure(&RUN)
+    };
+    assert!(refused(&whole[..whole.len() / 2]).contains("it was cut"));
+    assert!(refused(&fixture::ball_run(1)).contains("not a chip file"));
+    assert!(bench.failure(&["flash", "policy.armor", "--chip", "policy.armor"]).contains("not a chip file"));
+    fs::remove_file(bench.path("robot.chip")).unwrap();
+    assert!(bench.failure(&RUN).contains("cannot read robot.chip"));
+}
+
+#[test]
+fn a_file_that_cannot_be_written_is_named_and_nothing_is_left_behind() {
+    let bench = Bench::flashed();
+    let before = fs::read_dir(bench.folder.path()).unwrap().count();
+    let error = bench.failure(&[&RUN[..], &["-o", "no/such/folder/flight.csv"]].concat());
+    assert!(error.contains("cannot write no/such/folder/flight.csv"), "{error}");
+    assert_eq!(fs::read_dir(bench.folder.path()).unwrap().count(), before);
+}
