@@ -10,7 +10,7 @@ use serde::Serialize;
 use super::progress::Progress;
 use crate::config::{Config, Preset};
 use crate::data::Dataset;
-use crate::run::{self, Checkpoint, Outcome};
+use crate::run::{self, Checkpoint, Outcome, RunError};
 
 /// Train a policy on recorded data.
 ///
@@ -65,7 +65,10 @@ impl Fit {
         }
         config.data = absolute(&self.data);
         let started = std::time::Instant::now();
-        train("training", &config, &data, &self.out, self.resume, output)?;
+        let outcome = train("training", &config, &data, &self.out, self.resume, output)?;
+        if let Outcome::Stopped(step) = outcome {
+            return Err(format!("stopped and saved at step {step}; the same command with --resume goes on").into());
+        }
         output.report(&Report { out: self.out, steps: config.steps, seconds: started.elapsed().as_secs_f64() })
     }
 }
@@ -75,7 +78,7 @@ pub(super) fn absolute(path: &Path) -> String {
     std::path::absolute(path).unwrap_or_else(|_| path.into()).display().to_string()
 }
 
-/// Trains with a progress bar. A stop by Ctrl-C is an error that says how to go on.
+/// Trains with a progress bar.
 pub(super) fn train(
     label: &str,
     config: &Config,
@@ -83,17 +86,12 @@ pub(super) fn train(
     folder: &Path,
     resume: bool,
     output: Output,
-) -> CommandResult {
+) -> Result<Outcome, RunError> {
     let start = if resume { Checkpoint::read(folder)?.state.step } else { 0 };
     let mut progress = Progress::new(label, start, config.steps, output);
     let outcome = run::fit(config, data, folder, resume, &mut progress);
     progress.finish();
-    match outcome? {
-        Outcome::Done => Ok(()),
-        Outcome::Stopped(step) => {
-            Err(format!("stopped and saved at step {step}; the same command with --resume goes on").into())
-        }
-    }
+    outcome
 }
 
 impl fmt::Display for Report {

@@ -21,7 +21,7 @@ use super::fit::{absolute, train};
 use crate::config::Preset;
 use crate::data::{Dataset, Stats};
 use crate::export::{Agreement, export};
-use crate::run::Checkpoint;
+use crate::run::{Checkpoint, Outcome};
 
 /// The recording that ships with the project.
 const RECORDING: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../data/ball-run-bullet.hdf5");
@@ -133,10 +133,10 @@ impl Quickstart {
         config.data = absolute(&self.data);
         let started = Instant::now();
         let resume = folder.join(Checkpoint::FILE).exists();
-        train(&format!("seed {seed}"), &config, data, &folder, resume, output).map_err(|error| {
-            let resumed = error.to_string().replace("the same command with --resume", "the same command");
-            resumed
-        })?;
+        let outcome = train(&format!("seed {seed}"), &config, data, &folder, resume, output)?;
+        if let Outcome::Stopped(step) = outcome {
+            return Err(format!("stopped and saved seed {seed} at step {step}; the same command goes on").into());
+        }
         let train_seconds = started.elapsed().as_secs_f64();
 
         let checkpoint = Checkpoint::read(&folder)?;

@@ -1,10 +1,15 @@
 //! Makes the image, measures it, and makes it again with what was measured.
 
-use armor_core::image::{KappaRange, Manifest, PolicyImage, Precision, Provenance, Rung, SECTION_COUNT, write};
+use armor_core::image::{
+    KappaRange, MAX_RUNGS, Manifest, PolicyImage, Precision, Provenance, Quality, Rung, SECTION_COUNT, write,
+};
 use armor_core::schedule::Sampler;
 use armor_core::shape::Shape;
 use armor_core::units::{Cost, CostLimit};
 use armor_infer::Policy;
+use firmware_sim::flight::{FlightPlan, fly};
+use firmware_sim::task::Task;
+use heapless::Vec as FixedVec;
 use sha2::{Digest, Sha256};
 
 use super::agreement::{AGREEMENT_BOUND, Agreement, agreement};
@@ -17,6 +22,8 @@ use crate::model::Model;
 use crate::normaliser::Normaliser;
 use crate::run::Checkpoint;
 
+/// Episodes of the flight behind the quality card, as in the paper (Table 3).
+const QUALITY_EPISODES: u16 = 20;
 /// Bytes of an image beyond its sections: header, manifest and padding are far below.
 const OVERHEAD: usize = 4096;
 
@@ -51,9 +58,26 @@ pub fn export(checkpoint: &Checkpoint, data: &Dataset) -> Result<Exported, Expor
         return Err(ExportError::Disagreement { found: agreement.agreement_max_abs });
     }
 
-    let manifest = Manifest { agreement_max_abs: agreement.agreement_max_abs, ..manifest };
+    let quality = quality(&image, limit, config.seed)?;
+    let manifest = Manifest { agreement_max_abs: agreement.agreement_max_abs, quality, ..manifest };
     let bytes = build(&manifest, &sections(&actor, parameters, &normaliser, &trace))?;
     Ok(Exported { bytes, agreement })
+}
+
+/// How the policy flies on the task's native plant; empty where there is none.
+fn quality(image: &PolicyImage<'_>, limit: CostLimit, seed: u64) -> Result<FixedVec<Quality, MAX_RUNGS>, ExportError> {
+    let native = Task::named(image.manifest().task).ok().filter(|task| task.plant().is_ok());
+    let Some(task) = native else { return Ok(FixedVec::new()) };
+    let plan = FlightPlan { task, limit, episodes: QUALITY_EPISODES.into(), seed, rate_hz: task.rate_hz };
+    let summary = fly(image, &plan)?.summary;
+    let card = Quality {
+        rung: 0,
+        limit: limit.cost(),
+        episodes: QUALITY_EPISODES,
+        reward_normalized: summary.reward_normalized as f32,
+        cost_normalized: summary.cost_normalized as f32,
+    };
+    Ok([card].into_iter().collect())
 }
 
 /// The trained limit, or the largest budget of the data where that is smaller.

@@ -28,6 +28,9 @@ pub enum ExportError {
     /// The controller met a fault while it flew the golden trace.
     #[error("the exported policy fails on recorded states ({0}); train it again")]
     Fault(armor_infer::Fault),
+    /// The policy does not fly on its task's plant.
+    #[error("the exported policy cannot fly: {0}")]
+    Flight(#[from] firmware_sim::flight::FlightError),
     /// Trainer and image disagree.
     #[error(
         "trainer and image differ by {found:e} in an action, more than {AGREEMENT_BOUND:e}; this is a defect, please report it"

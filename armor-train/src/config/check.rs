@@ -1,0 +1,86 @@
+//! The range of every option.
+
+use armor_core::schedule::MAX_STEPS;
+
+use super::{Config, ConfigError};
+
+impl Config {
+    /// Whether every option lies in its range.
+    ///
+    /// # Errors
+    /// [`ConfigError::OutOfRange`] for the first that does not.
+    pub fn check(&self) -> Result<(), ConfigError> {
+        let widths = [
+            ("hidden", self.hidden),
+            ("kappa_hidden", self.kappa_hidden),
+            ("kappa_embedding", self.kappa_embedding),
+            ("time_hidden", self.time_hidden),
+            ("time_embedding", self.time_embedding),
+            ("trunk", self.trunk),
+            ("head", self.head),
+            ("dual_hidden", self.dual_hidden),
+        ];
+        for (key, width) in widths {
+            require(key, (1..=1024).contains(&width), "between 1 and 1024")?;
+        }
+        let positive = [
+            ("reward_scale", self.reward_scale),
+            ("cost_scale", self.cost_scale),
+            ("kappa_scale", self.kappa_scale),
+            ("actor_rate", self.actor_rate),
+            ("critic_rate", self.critic_rate),
+            ("dual_rate", self.dual_rate),
+        ];
+        for (key, value) in positive {
+            require(key, value.is_finite() && value > 0.0, "a positive number")?;
+        }
+        let shares = [
+            ("target_rate", self.target_rate),
+            ("reward_discount", self.reward_discount),
+            ("long_cost_discount", self.long_cost_discount),
+            ("short_cost_discount", self.short_cost_discount),
+            ("reweight_ema", self.reweight_ema),
+        ];
+        for (key, value) in shares {
+            require(key, (0.0..=1.0).contains(&value), "between 0 and 1")?;
+        }
+        for (key, value) in [("limit", self.limit), ("eta", self.eta), ("beta", self.beta), ("sigma", self.sigma)] {
+            require(key, value.is_finite() && value >= 0.0, "a number of at least 0")?;
+        }
+        require("limit", self.limit < 65536.0, "below 65536")?;
+        require("steps", self.steps >= 1, "at least 1")?;
+        require("batch", (1..=65536).contains(&self.batch), "between 1 and 65536")?;
+        require("perturbations", (1..=1024).contains(&self.perturbations), "between 1 and 1024")?;
+        require("diffusion_steps", (1..=MAX_STEPS).contains(&self.diffusion_steps), "between 1 and 64")?;
+        require(
+            "target_steps",
+            (1..=self.diffusion_steps).contains(&self.target_steps),
+            "between 1 and diffusion_steps",
+        )?;
+        let is_code = self.time_code >= 4 && self.time_code.is_multiple_of(2) && self.time_code <= 1024;
+        require("time_code", is_code, "even and between 4 and 1024")?;
+        require("reweight_interval", self.reweight_interval >= 1, "at least 1")?;
+        let ordered = 0.0 <= self.weight_min && self.weight_min <= self.weight_max && self.weight_max.is_finite();
+        require("weight_max", ordered, "a number of at least weight_min, and weight_min at least 0")
+    }
+}
+
+fn require(key: &'static str, holds: bool, range: &'static str) -> Result<(), ConfigError> {
+    if holds { Ok(()) } else { Err(ConfigError::OutOfRange { key, range }) }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::config::Preset;
+
+    #[test]
+    fn an_option_out_of_range_is_named() {
+        for bad in ["batch=0", "target_steps=21", "diffusion_steps=65", "time_code=5", "weight_max=0.1", "eta=nan"] {
+            let mut config = Preset::Paper.config("ball-run", 5.0);
+            config.set(bad).unwrap();
+            let error = config.check().unwrap_err().to_string();
+            let key = bad.split('=').next().unwrap();
+            assert!(error.contains(key) || bad.starts_with("diffusion"), "{error}");
+        }
+    }
+}

@@ -1,0 +1,136 @@
+//! Every choice of a training run, with the paper's values and their sources.
+
+mod assign;
+mod check;
+mod preset;
+
+use armor_core::schedule::Sampler;
+use serde::{Deserialize, Serialize};
+
+use crate::actor::PolicyGradient;
+
+pub use preset::Preset;
+
+/// The effective configuration of a run; it is saved as `config.toml` in the run's folder.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Config {
+    /// Preset that the other keys started from.
+    pub preset: Preset,
+    /// Path of the recorded data.
+    pub data: String,
+    /// Task, such as `ball-run`.
+    pub task: String,
+    /// Cost limit `d` of an episode, in units of recorded cost (Eq. 1).
+    pub limit: f64,
+    /// Seed of everything random.
+    pub seed: u64,
+    /// Training steps (Table 2).
+    pub steps: u64,
+    /// Transitions of a training step (Table 2).
+    pub batch: usize,
+
+    /// Factor on recorded rewards (O-4).
+    pub reward_scale: f64,
+    /// Factor on recorded costs and on kappa (O-4).
+    pub cost_scale: f64,
+    /// Factor on kappa where it enters a network (O-8).
+    pub kappa_scale: f64,
+    /// Whether the networks see states with mean 0 and variance 1 (O-5).
+    pub normalize_states: bool,
+
+    /// Denoising steps `N` (Table 2).
+    pub diffusion_steps: usize,
+    /// Units of the denoiser's three hidden layers (Appendix B).
+    pub hidden: usize,
+    /// Hidden units of the kappa embedding (O-8).
+    pub kappa_hidden: usize,
+    /// Entries of the kappa embedding (O-8).
+    pub kappa_embedding: usize,
+    /// Entries of the sinusoidal code of a step (O-9).
+    pub time_code: usize,
+    /// Hidden units of the time embedding (O-9).
+    pub time_hidden: usize,
+    /// Entries of the time embedding (O-9).
+    pub time_embedding: usize,
+    /// Units of the critic's two shared layers (Appendix B).
+    pub trunk: usize,
+    /// Hidden units of a critic head (Appendix B, O-6).
+    pub head: usize,
+    /// Units of the dual network's two hidden layers (Appendix B).
+    pub dual_hidden: usize,
+
+    /// Learning rate of the actor (Table 2).
+    pub actor_rate: f64,
+    /// Learning rate of the critic (Table 2).
+    pub critic_rate: f64,
+    /// Learning rate of the dual (Appendix B).
+    pub dual_rate: f64,
+    /// Soft update of the target critic, tau (Appendix B).
+    pub target_rate: f64,
+    /// Discount of the reward, `gamma_r` (Table 2).
+    pub reward_discount: f64,
+    /// Discount of the long-term cost, `gamma_cL` (Table 2).
+    pub long_cost_discount: f64,
+    /// Discount of the short-term cost, `gamma_cS` (Table 2).
+    pub short_cost_discount: f64,
+    /// Reward guidance coefficient, eta (Eq. 14, Table 2).
+    pub eta: f64,
+    /// How the policy improvement differentiates (O-13).
+    pub policy_gradient: PolicyGradient,
+    /// Sampler of the next action in the targets (Eq. 3).
+    pub target_sampler: Sampler,
+    /// Steps of that sampler, at most `diffusion_steps`.
+    pub target_steps: usize,
+
+    /// Training steps before the weights are active (Table 2).
+    pub reweight_warmup: u64,
+    /// Training steps between refreshes of the weights (Table 2).
+    pub reweight_interval: u64,
+    /// Share of the new value in the moving average of counterfactual weights (Table 2, O-21).
+    pub reweight_ema: f64,
+    /// Trajectory weight control coefficient, beta (Eq. 6, Table 2).
+    pub beta: f64,
+    /// Counterfactual samples `K` (Table 2).
+    pub perturbations: usize,
+    /// Counterfactual noise, sigma (Table 2).
+    pub sigma: f64,
+    /// Smallest weight, `w_min` (Eq. 10, Table 2).
+    pub weight_min: f64,
+    /// Largest weight, `w_max` (Eqs. 9 and 10, Table 2).
+    pub weight_max: f64,
+}
+
+/// Why a configuration cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum ConfigError {
+    /// A `--set` without `=`.
+    #[error("`{0}` is not of the form key=value")]
+    NotAnAssignment(String),
+    /// A key that does not exist.
+    #[error("there is no option `{key}`; did you mean `{nearest}`?")]
+    UnknownKey {
+        /// What was given.
+        key: String,
+        /// The most similar existing key.
+        nearest: String,
+    },
+    /// A value of the wrong kind.
+    #[error("option `{key}` cannot be `{value}`: {reason}")]
+    BadValue {
+        /// The option.
+        key: String,
+        /// What was given.
+        value: String,
+        /// What was expected.
+        reason: String,
+    },
+    /// A value out of its range.
+    #[error("option `{key}` must be {range}")]
+    OutOfRange {
+        /// The option.
+        key: &'static str,
+        /// Its range in words.
+        range: &'static str,
+    },
+}

@@ -1,0 +1,124 @@
+//! Named sets of choices.
+
+use armor_core::schedule::Sampler;
+use serde::{Deserialize, Serialize};
+
+use super::Config;
+use crate::actor::PolicyGradient;
+
+/// A named set of choices.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "snake_case")]
+pub enum Preset {
+    /// The paper to the letter; 200,000 steps of a full-size network.
+    Paper,
+    /// The same method in minutes: smaller networks, one-step actor gradient,
+    /// short target chains; in a short run feasible trajectories need a larger weight.
+    Quick,
+}
+
+impl Preset {
+    /// The preset as it is written in a configuration.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Paper => "paper",
+            Self::Quick => "quick",
+        }
+    }
+
+    /// The preset's choices for a task and its cost limit.
+    pub fn config(self, task: &str, limit: f64) -> Config {
+        let paper = Config {
+            preset: Self::Paper,
+            data: String::new(),
+            task: task.to_owned(),
+            limit,
+            seed: 0,
+            steps: 200_000,
+            batch: 512,
+            reward_scale: 0.1,
+            cost_scale: 1.0,
+            kappa_scale: 1.0,
+            normalize_states: false,
+            diffusion_steps: 20,
+            hidden: 256,
+            kappa_hidden: 32,
+            kappa_embedding: 16,
+            time_code: 16,
+            time_hidden: 32,
+            time_embedding: 16,
+            trunk: 256,
+            head: 128,
+            dual_hidden: 256,
+            actor_rate: 1e-4,
+            critic_rate: 1e-3,
+            dual_rate: 1e-4,
+            target_rate: 0.005,
+            reward_discount: 0.99,
+            long_cost_discount: 0.99,
+            short_cost_discount: 0.3,
+            eta: 1.0,
+            policy_gradient: PolicyGradient::Full,
+            target_sampler: Sampler::Ddpm,
+            target_steps: 20,
+            reweight_warmup: 20_000,
+            reweight_interval: 5_000,
+            reweight_ema: 0.3,
+            beta: 0.5,
+            perturbations: 8,
+            sigma: 0.1,
+            weight_min: 0.8,
+            weight_max: 2.0,
+        };
+        match self {
+            Self::Paper => paper,
+            Self::Quick => Config {
+                preset: Self::Quick,
+                steps: 9_000,
+                batch: 256,
+                normalize_states: true,
+                hidden: 128,
+                trunk: 128,
+                head: 64,
+                dual_hidden: 64,
+                actor_rate: 5e-4,
+                target_rate: 0.01,
+                policy_gradient: PolicyGradient::OneStep,
+                target_sampler: Sampler::Ddim,
+                target_steps: 5,
+                reweight_warmup: 1_000,
+                reweight_interval: 1_000,
+                beta: 10.0,
+                weight_min: 0.1,
+                weight_max: 5.0,
+                ..paper
+            },
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Table 2 and Appendix B of the paper.
+    #[test]
+    fn the_paper_preset_is_the_papers_tables() {
+        let c = Preset::Paper.config("ball-run", 5.0);
+        assert_eq!((c.steps, c.batch, c.diffusion_steps), (200_000, 512, 20));
+        assert_eq!((c.actor_rate, c.critic_rate, c.dual_rate), (1e-4, 1e-3, 1e-4));
+        assert_eq!((c.reward_discount, c.long_cost_discount, c.short_cost_discount), (0.99, 0.99, 0.3));
+        assert_eq!((c.eta, c.target_rate, c.beta, c.sigma, c.perturbations), (1.0, 0.005, 0.5, 0.1, 8));
+        assert_eq!((c.reweight_warmup, c.reweight_interval, c.reweight_ema), (20_000, 5_000, 0.3));
+        assert_eq!((c.weight_min, c.weight_max), (0.8, 2.0));
+        assert_eq!((c.hidden, c.trunk, c.head, c.dual_hidden), (256, 256, 128, 256));
+        assert_eq!(c.policy_gradient, PolicyGradient::Full);
+    }
+
+    #[test]
+    fn presets_pass_their_own_check() {
+        for preset in [Preset::Paper, Preset::Quick] {
+            preset.config("ball-run", 5.0).check().unwrap();
+        }
+    }
+}
