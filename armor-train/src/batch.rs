@@ -21,6 +21,8 @@ pub struct Batch<T: Scalar> {
     pub kappa: Vec<T>,
     /// Remaining budget after the step `[B]`.
     pub next_kappa: Vec<T>,
+    /// What `Q_cL` is held against, in units of scaled cost `[B]`; kappa in the paper.
+    pub threshold: Vec<T>,
     /// 1 where the episode goes on after the step, 0 where it ends `[B]`.
     pub alive: Vec<T>,
     /// Weight `w` of Eq. 10 `[B]`.
@@ -39,6 +41,7 @@ impl<T: Scalar> Batch<T> {
             cost: row(),
             kappa: row(),
             next_kappa: row(),
+            threshold: row(),
             alive: row(),
             weight: row(),
         }

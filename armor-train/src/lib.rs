@@ -28,7 +28,9 @@ pub mod normaliser;
 pub mod pcgrad;
 pub mod reweight;
 pub mod run;
+mod source;
 mod stream;
 #[cfg(test)]
 mod testing;
+pub mod threshold;
 pub mod update;

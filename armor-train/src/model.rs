@@ -25,6 +25,8 @@ pub struct Model {
     pub target_chain: Vec<ChainStep<f64>>,
     /// Discounts of reward, long-term and short-term cost.
     pub discounts: [f64; 3],
+    /// Largest norm of a network's gradient; 0 is no limit.
+    pub gradient_clip: f64,
 }
 
 /// The numbers of all networks, each a flat vector.
@@ -74,10 +76,12 @@ impl Model {
                 schedule,
                 policy_gradient: config.policy_gradient,
                 eta: config.eta,
+                constraint_scale: if config.dual_normalize { 1.0 / (config.limit * config.cost_scale) } else { 1.0 },
             },
             critic: Critic::new(state, action, config.trunk, config.head, config.kappa_scale),
             dual: Dual::new(config.dual_hidden, config.kappa_scale),
             target_chain: schedule.chain(config.target_sampler, config.target_steps).collect(),
+            gradient_clip: config.gradient_clip,
             discounts: [config.reward_discount, config.long_cost_discount, config.short_cost_discount],
         }
     }
@@ -106,6 +110,39 @@ impl<T: Scalar> Optimisers<T> {
             actor: Adam::new(parameters.actor.len(), config.actor_rate),
             critic: Adam::new(parameters.critic.len(), config.critic_rate),
             dual: Adam::new(parameters.dual.len(), config.dual_rate),
+        }
+    }
+
+    /// Sets the learning rates of a training step: along half a cosine from the
+    /// configured ones to their `final_rate` share (O-30).
+    pub fn schedule(&mut self, config: &Config, step: u64) {
+        let cosine = 0.5 + 0.5 * (std::f64::consts::PI * step as f64 / config.steps as f64).cos();
+        let factor = config.final_rate + (1.0 - config.final_rate) * cosine;
+        self.actor.set_rate(config.actor_rate * factor);
+        self.critic.set_rate(config.critic_rate * factor);
+        self.dual.set_rate(config.dual_rate * factor);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::Preset;
+
+    /// Adam's first step is as long as its learning rate.
+    #[test]
+    fn learning_rates_fall_along_half_a_cosine() {
+        let mut config = Preset::Paper.config("own", 1.0);
+        (config.steps, config.actor_rate, config.final_rate) = (10, 1.0, 0.2);
+        let first_step = |step| {
+            let mut parameters = Parameters { actor: vec![0.0f64], critic: vec![], target: vec![], dual: vec![] };
+            let mut optimisers = Optimisers::new(&config, &parameters);
+            optimisers.schedule(&config, step);
+            optimisers.actor.descend(&mut parameters.actor, &[1.0]);
+            -parameters.actor[0]
+        };
+        for (step, expected) in [(0, 1.0), (5, 0.6), (10, 0.2)] {
+            assert!((first_step(step) - expected).abs() < 1e-6);
         }
     }
 }

@@ -1,6 +1,10 @@
 //! Which stream of the counter-based noise serves what, so that no two uses
 //! share a draw and a resumed run repeats the draws of one never stopped.
 
+use armor_core::noise::{Noise, below};
+
+use crate::nn::Scalar;
+
 /// Initial weights; the tick is the network.
 pub(crate) const INITIALISE: u32 = 1;
 /// Rows of a batch; the tick is the training step.
@@ -11,6 +15,10 @@ pub(crate) const LEVELS: u32 = 3;
 pub(crate) const SURGERY: u32 = 4;
 /// Shuffle of the data into mini-batches; the tick is the training step.
 pub(crate) const SHUFFLE: u32 = 5;
+/// Whether a sample's budget is relabelled; the tick is the training step.
+pub(crate) const BUDGET: u32 = 7;
+/// The budget it is relabelled with; the tick is the training step.
+pub(crate) const RELABEL: u32 = 8;
 /// Noise of behaviour cloning; the tick is the sample (step times batch, plus its place).
 pub(crate) const CLONING: u32 = 6;
 /// Chain of the next actions, one stream a stage; the tick is the sample.
@@ -19,3 +27,22 @@ pub(crate) const TARGET_CHAIN: u32 = 0x100;
 pub(crate) const POLICY_CHAIN: u32 = 0x200;
 /// Perturbed actions, one stream a perturbation; the tick is the refresh times rows, plus the row.
 pub(crate) const PERTURBATION: u32 = 0x400;
+
+/// Standard normal draws of a stream and tick, as the controller would draw them.
+pub(crate) fn fill_normal<T: Scalar>(noise: Noise, stream: u32, tick: u64, out: &mut [T]) {
+    for (block, four) in (0..).zip(out.chunks_mut(4)) {
+        for (value, draw) in four.iter_mut().zip(noise.normals(stream, tick, block)) {
+            *value = T::of_f32(draw);
+        }
+    }
+}
+
+/// The numbers below `len` in a random order (Fisher and Yates).
+pub(crate) fn shuffled(len: usize, noise: Noise, tick: u64) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..len).collect();
+    for last in (1..len).rev() {
+        let [word, ..] = noise.words(SHUFFLE, tick, last as u32);
+        order.swap(last, below(word, last as u32 + 1) as usize);
+    }
+    order
+}

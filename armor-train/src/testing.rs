@@ -2,6 +2,8 @@
 
 use armor_core::noise::Noise;
 
+use crate::data::{Dataset, Recording};
+
 /// `len` repeatable standard normal draws, halved.
 pub(crate) fn fill(len: usize, stream: u32) -> Vec<f64> {
     let mut draws = vec![0f32; len];
@@ -25,4 +27,23 @@ pub(crate) fn assert_gradient(at: &[f64], gradient: &[f64], loss: impl Fn(&[f64]
         let tolerance = 1e-7 * (1.0 + slope.abs());
         assert!((slope - expected).abs() < tolerance, "entry {index}: gradient {expected}, slope {slope}");
     }
+}
+
+/// Two trajectories of three steps, with one state and one action entry; the
+/// first costs 1, 0, 1, the second nothing.
+pub(crate) fn dataset() -> Dataset {
+    let observations: Vec<f32> = vec![0.0, 1.0, 2.0, 10.0, 11.0, 12.0];
+    let recording = Recording {
+        state_dim: 1,
+        action_dim: 1,
+        next_observations: observations.iter().map(|state| state + 1.0).collect(),
+        observations,
+        actions: vec![0.1, 0.2, 0.3, 0.4, 0.5, 0.6],
+        rewards: vec![1.0; 6],
+        costs: vec![1.0, 0.0, 1.0, 0.0, 0.0, 0.0],
+        terminals: vec![false; 6],
+        timeouts: vec![false, false, true, false, false, true],
+        sha256: [0; 32],
+    };
+    Dataset::new(recording).expect("the recording is sound")
 }

@@ -13,7 +13,7 @@ use crate::actor::{ActorLoss, ActorNoise, ActorTape, Judges};
 use crate::batch::Batch;
 use crate::critic::{CriticTape, Task, bellman_target};
 use crate::model::{Model, Optimisers, Parameters};
-use crate::nn::{Scalar, accumulate, soft_update};
+use crate::nn::{Scalar, accumulate, clip_norm, soft_update};
 use crate::pcgrad;
 
 /// A share of the batch, and room for everything that is computed from it.
@@ -159,6 +159,7 @@ pub fn update_critic<T: Scalar>(
         }
     }
     metrics.conflicts = pcgrad::project(&trunk, orders, &mut gradient[..model.critic.trunk_size()]);
+    clip_norm(&mut gradient, model.gradient_clip);
     optimisers.critic.descend(&mut parameters.critic, &gradient);
     (metrics, gradient)
 }
@@ -186,6 +187,8 @@ pub fn update_actor<T: Scalar>(
         accumulate(&mut dual_gradient, &worker.dual_gradient);
         sum = sum + worker.actor_loss;
     }
+    clip_norm(&mut gradient, model.gradient_clip);
+    clip_norm(&mut dual_gradient, model.gradient_clip);
     optimisers.actor.descend(&mut parameters.actor, &gradient);
     optimisers.dual.descend(&mut parameters.dual, &dual_gradient);
     (sum * (1.0 / batch_len as f64), [gradient, dual_gradient])

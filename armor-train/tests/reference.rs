@@ -69,11 +69,18 @@ impl Reference {
         let kappa_scale = self.0["config"]["kappa_scale"].as_f64().unwrap();
         let schedule = VpSchedule::new(STEPS);
         Model {
-            actor: Actor { denoiser: Denoiser::new(widths, kappa_scale), schedule, policy_gradient, eta: 1.0 },
+            actor: Actor {
+                denoiser: Denoiser::new(widths, kappa_scale),
+                schedule,
+                policy_gradient,
+                eta: 1.0,
+                constraint_scale: 1.0,
+            },
             critic: Critic::new(STATE, ACTION, 12, 10, kappa_scale),
             dual: Dual::new(9, kappa_scale),
             target_chain: schedule.chain(Sampler::Ddpm, STEPS).collect(),
             discounts: [0.99, 0.99, 0.3],
+            gradient_clip: 0.0,
         }
     }
 
@@ -107,6 +114,7 @@ impl Reference {
             worker.batch.reward = entries("r");
             worker.batch.cost = entries("c");
             worker.batch.kappa = entries("kappa");
+            worker.batch.threshold = entries("kappa");
             worker.batch.next_kappa = entries("kappa_next");
             worker.batch.alive = entries("done").iter().map(|done| 1.0 - done).collect();
             worker.batch.weight = entries("w");
@@ -232,7 +240,7 @@ fn critic_values_are_pytorchs() {
 fn counterfactual_weights_are_pytorchs() {
     let reference = Reference::read();
     let critic = reference.model(PolicyGradient::Full).critic;
-    let settings = Counterfactual { perturbations: 3, sigma: 0.1, max: 2.0, ema: 0.3 };
+    let settings = Counterfactual { perturbations: 3, sigma: vec![0.1; ACTION], max: 2.0, ema: 0.3 };
     let perturbation = reference.numbers("perturbation");
     let draw = |k: usize, sample: usize, out: &mut [f64]| {
         let at = (k * SAMPLES + sample) * ACTION;
@@ -241,7 +249,8 @@ fn counterfactual_weights_are_pytorchs() {
     let inputs = (&reference.matrix("s", STATE), &reference.numbers("kappa")[..], &reference.matrix("a", ACTION));
     let mut margin = vec![0.0; SAMPLES];
     let after = reference.numbers("critic_after");
-    settings.margins((&critic, &after[..]), inputs, &draw, &mut critic.tape(SAMPLES), &mut margin);
+    let bound = inputs.1;
+    settings.margins((&critic, &after[..]), inputs, bound, &draw, &mut critic.tape(SAMPLES), &mut margin);
     reference.expect("m", &margin);
 
     // The weights themselves are kept in f32.

@@ -40,6 +40,8 @@ pub struct Actor {
     pub policy_gradient: PolicyGradient,
     /// Reward guidance coefficient, eta of Eq. 14.
     pub eta: f64,
+    /// Factor on the violation of the constraint; 1 in the paper.
+    pub constraint_scale: f64,
 }
 
 /// What an update of the actor and the dual needs, for a share of the batch.
@@ -54,7 +56,7 @@ pub struct ActorTape<T: Scalar> {
     dual: DualTape<T>,
     /// The policy's actions `a_pi`, `A x B`.
     pub action: DMatrix<T>,
-    /// `Q_cL - kappa` at `a_pi` `[B]`.
+    /// `Q_cL - threshold` at `a_pi`, scaled `[B]`; the paper's threshold is kappa.
     pub violation: Vec<T>,
     action_gradient: DMatrix<T>,
 }
@@ -161,9 +163,10 @@ impl Actor {
         let tasks = [Task::Reward, Task::LongCost];
         let at_policy = (&batch.state, &batch.kappa[..], &tape.action);
         critic.forward(critic_parameters, &tasks, at_policy, &mut tape.critic, true);
-        let pairs = tape.critic.pessimistic(Task::LongCost).zip(&batch.kappa);
-        for (violation, (q, &kappa)) in tape.violation.iter_mut().zip(pairs) {
-            *violation = q - kappa;
+        let scale = T::of(self.constraint_scale);
+        let pairs = tape.critic.pessimistic(Task::LongCost).zip(&batch.threshold);
+        for (violation, (q, &threshold)) in tape.violation.iter_mut().zip(pairs) {
+            *violation = scale * (q - threshold);
         }
         let sum = |task| tape.critic.pessimistic(task).map(T::to_f64).sum();
         let (reward, long_cost) = (sum(Task::Reward), sum(Task::LongCost));
@@ -173,7 +176,7 @@ impl Actor {
         let dual_loss = dual.backward(dual_parameters, &tape.violation, batch_len, &mut tape.dual, dual_gradient);
 
         let reward_slope = vec![-T::of(self.eta) * share; batch.samples()];
-        let cost_slope: Vec<T> = tape.dual.lambda.iter().map(|&lambda| lambda * share).collect();
+        let cost_slope: Vec<T> = tape.dual.lambda.iter().map(|&lambda| lambda * scale * share).collect();
         let slopes = [(Task::Reward, &reward_slope[..]), (Task::LongCost, &cost_slope[..])];
         critic.action_gradient(critic_parameters, &slopes, &mut tape.critic, &mut tape.action_gradient);
 

@@ -42,12 +42,13 @@ fn fixture(policy_gradient: PolicyGradient) -> Fixture {
     batch.state = DMatrix::from_vec(3, SAMPLES, fill(3 * SAMPLES, 11));
     batch.action = DMatrix::from_vec(2, SAMPLES, fill(2 * SAMPLES, 12));
     batch.kappa = vec![0.0, 1.0, 2.0, 3.0];
+    batch.threshold = batch.kappa.clone();
     batch.weight = vec![0.8, 1.0, 1.5, 2.0];
     Fixture {
         parameters: fill(denoiser.size(), 1),
         critic_parameters: fill(critic.size(), 2),
         dual_parameters: fill(dual.size(), 3),
-        actor: Actor { denoiser, schedule: VpSchedule::new(STEPS), policy_gradient, eta: 0.7 },
+        actor: Actor { denoiser, schedule: VpSchedule::new(STEPS), policy_gradient, eta: 0.7, constraint_scale: 0.6 },
         critic,
         dual,
         batch,

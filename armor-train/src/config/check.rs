@@ -40,6 +40,8 @@ impl Config {
             ("long_cost_discount", self.long_cost_discount),
             ("short_cost_discount", self.short_cost_discount),
             ("reweight_ema", self.reweight_ema),
+            ("relabel_share", self.relabel_share),
+            ("final_rate", self.final_rate),
         ];
         for (key, value) in shares {
             require(key, (0.0..=1.0).contains(&value), "between 0 and 1")?;
@@ -47,6 +49,20 @@ impl Config {
         for (key, value) in [("limit", self.limit), ("eta", self.eta), ("beta", self.beta), ("sigma", self.sigma)] {
             require(key, value.is_finite() && value >= 0.0, "a number of at least 0")?;
         }
+        let not_negative = [
+            ("dual_slack", self.dual_slack),
+            ("gradient_clip", self.gradient_clip),
+            ("counterfactual_tolerance", self.counterfactual_tolerance),
+        ];
+        for (key, value) in not_negative {
+            require(key, value.is_finite() && value >= 0.0, "a number of at least 0")?;
+        }
+        require("actor_average", (0.0..1.0).contains(&self.actor_average), "from 0 to below 1")?;
+        require("feasible_mass", (0.0..1.0).contains(&self.feasible_mass), "from 0 to below 1")?;
+        require("dual_normalize", !self.dual_normalize || self.limit > 0.0, "false where the limit is 0")?;
+        // TOML has signed numbers only.
+        require("seed", i64::try_from(self.seed).is_ok(), "below 2^63")?;
+        require("steps", i64::try_from(self.steps).is_ok(), "below 2^63")?;
         require("limit", self.limit < 65536.0, "below 65536")?;
         require("steps", self.steps >= 1, "at least 1")?;
         require("batch", (1..=65536).contains(&self.batch), "between 1 and 65536")?;

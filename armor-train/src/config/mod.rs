@@ -8,6 +8,8 @@ use armor_core::schedule::Sampler;
 use serde::{Deserialize, Serialize};
 
 use crate::actor::PolicyGradient;
+use crate::reweight::reference::Reference;
+use crate::threshold::Threshold;
 
 pub use preset::Preset;
 
@@ -83,6 +85,25 @@ pub struct Config {
     /// Steps of that sampler, at most `diffusion_steps`.
     pub target_steps: usize,
 
+    /// Share of samples whose kappa is relabelled with a larger budget; 0 in the
+    /// paper. Recorded kappa always ends at 0, so a clone learns to spend it all.
+    pub relabel_share: f64,
+    /// What `Q_cL` is held against in Eqs. 14 to 16.
+    pub threshold: Threshold,
+    /// Added to that, in units of recorded cost; 0 in the paper. Noise in `Q_cL`
+    /// otherwise keeps the constraint violated at kappa 0.
+    pub dual_slack: f64,
+    /// Whether the violation is counted in limits instead of units of cost.
+    pub dual_normalize: bool,
+    /// Learning rates at the last step as a share of the first, along half a
+    /// cosine; 1, constant, in the paper (O-30).
+    pub final_rate: f64,
+    /// Largest Euclidean norm of a network's gradient; 0, no limit, in the paper (O-30).
+    pub gradient_clip: f64,
+    /// Decay of a moving average of the actor's weights, which is exported in
+    /// their place; 0, none, in the paper (O-10).
+    pub actor_average: f64,
+
     /// Training steps before the weights are active (Table 2).
     pub reweight_warmup: u64,
     /// Training steps between refreshes of the weights (Table 2).
@@ -91,10 +112,19 @@ pub struct Config {
     pub reweight_ema: f64,
     /// Trajectory weight control coefficient, beta (Eq. 6, Table 2).
     pub beta: f64,
+    /// Share of the weight that feasible trajectories get together; 0 leaves it
+    /// to `beta`, as the paper does.
+    pub feasible_mass: f64,
     /// Counterfactual samples `K` (Table 2).
     pub perturbations: usize,
     /// Counterfactual noise, sigma (Table 2).
     pub sigma: f64,
+    /// Whether sigma counts in standard deviations of each recorded action entry.
+    pub sigma_per_entry: bool,
+    /// What `Q_cS` is held against in Eq. 8.
+    pub counterfactual_reference: Reference,
+    /// Added to that, in units of recorded cost; 0 in the paper.
+    pub counterfactual_tolerance: f64,
     /// Smallest weight, `w_min` (Eq. 10, Table 2).
     pub weight_min: f64,
     /// Largest weight, `w_max` (Eqs. 9 and 10, Table 2).

@@ -5,6 +5,8 @@ use serde::{Deserialize, Serialize};
 
 use super::Config;
 use crate::actor::PolicyGradient;
+use crate::reweight::reference::Reference;
+use crate::threshold::Threshold;
 
 /// A named set of choices.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
@@ -61,12 +63,23 @@ impl Preset {
             policy_gradient: PolicyGradient::Full,
             target_sampler: Sampler::Ddpm,
             target_steps: 20,
+            relabel_share: 0.0,
+            threshold: Threshold::Kappa,
+            dual_slack: 0.0,
+            dual_normalize: false,
+            final_rate: 1.0,
+            gradient_clip: 0.0,
+            actor_average: 0.0,
             reweight_warmup: 20_000,
             reweight_interval: 5_000,
             reweight_ema: 0.3,
             beta: 0.5,
+            feasible_mass: 0.0,
             perturbations: 8,
             sigma: 0.1,
+            sigma_per_entry: false,
+            counterfactual_reference: Reference::Kappa,
+            counterfactual_tolerance: 0.0,
             weight_min: 0.8,
             weight_max: 2.0,
         };

@@ -54,6 +54,13 @@ pub enum Fault {
         /// The HDF5 reader's words.
         reason: String,
     },
+    /// A part of HDF5 that is not read here: a newer file format, another filter than gzip, shuffle
+    /// and the like, data kept in other files.
+    #[error("HDF5 of a kind that is not read here: {reason}; write it with libver v114 or earlier and gzip")]
+    Unsupported {
+        /// The HDF5 reader's words.
+        reason: String,
+    },
     /// A data set of the DSRL layout is missing.
     #[error("no data set `{key}` in the root, only {}; rename the one that holds it, or record it", list(.present))]
     MissingKey {

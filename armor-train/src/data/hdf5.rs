@@ -3,8 +3,6 @@
 //! A file's claims are checked before they cost memory: the types and shapes of
 //! all data sets first, then the values of those whose rows agree.
 
-use std::fmt;
-
 use hdf5_pure::{Datatype, Error, File, FormatError};
 use sha2::{Digest, Sha256};
 
@@ -52,7 +50,7 @@ fn open(bytes: Vec<u8>) -> Result<File, Fault> {
     if !hdf5_pure::is_hdf5_bytes(&bytes) {
         return Err(Fault::NotHdf5 { bytes: length });
     }
-    let file = File::from_bytes(bytes).map_err(damaged)?;
+    let file = File::from_bytes(bytes).map_err(refused)?;
     // The HDF5 reader itself does not mind a missing tail until it needs it.
     let superblock = file.superblock();
     let expected = superblock.eof_address.saturating_add(superblock.base_address.get());
@@ -75,16 +73,16 @@ fn find(file: &File, key: Key) -> Result<Source, Fault> {
         Ok(dataset) => dataset,
         // A group of that name is no data set either.
         Err(Error::Format(FormatError::PathNotFound(_)) | Error::NotADataset(_)) => {
-            let present = file.root().datasets().map_err(damaged)?;
+            let present = file.root().datasets().map_err(refused)?;
             return Err(Fault::MissingKey { key, present });
         }
-        Err(error) => return Err(damaged_at(key, error)),
+        Err(error) => return Err(refused_at(key, error)),
     };
-    let found = dataset.datatype().map_err(|error| damaged_at(key, error))?;
+    let found = dataset.datatype().map_err(|error| refused_at(key, error))?;
     if !is_supported(key, &found) {
         return Err(Fault::UnsupportedType { key, found: found.to_string() });
     }
-    let shape = dataset.shape().map_err(|error| damaged_at(key, error))?;
+    let shape = dataset.shape().map_err(|error| refused_at(key, error))?;
     let (rows, width) = match shape[..] {
         [rows] if !key.is_vector() => (rows, 1),
         [rows, width] if key.accepts_width(width) => (rows, width),
@@ -132,23 +130,39 @@ impl Source {
     fn values(self, file_bytes: u64) -> Result<Column, Fault> {
         let key = self.key;
         let values = self.rows.saturating_mul(self.width);
-        let element = self.dataset.element_size().map_err(|error| damaged_at(key, error))?;
+        let element = self.dataset.element_size().map_err(|error| refused_at(key, error))?;
         let stored = values.saturating_mul(element);
         if stored > file_bytes.saturating_mul(DEFLATE_MAX_RATIO) {
-            return Err(damaged_at(key, format!("{stored} bytes claimed, more than the file can hold")));
+            return Err(Fault::Damaged {
+                reason: format!("`{key}` claims {stored} bytes, more than the file can hold"),
+            });
         }
-        let read = self.dataset.read_f32().map_err(|error| damaged_at(key, error))?;
+        let read = self.dataset.read_f32().map_err(|error| refused_at(key, error))?;
         if read.len() as u64 != values {
-            return Err(damaged_at(key, format!("{values} values claimed, {} found", read.len())));
+            return Err(Fault::Damaged { reason: format!("`{key}` claims {values} values but holds {}", read.len()) });
         }
         Ok(Column { width: self.width as usize, values: read })
     }
 }
 
-fn damaged(error: Error) -> Fault {
-    Fault::Damaged { reason: error.to_string() }
+fn refused(error: Error) -> Fault {
+    named(error.to_string(), &error)
 }
 
-fn damaged_at(key: Key, error: impl fmt::Display) -> Fault {
-    Fault::Damaged { reason: format!("`{key}`: {error}") }
+fn refused_at(key: Key, error: Error) -> Fault {
+    named(format!("`{key}`: {error}"), &error)
+}
+
+/// A version or a filter that the HDF5 reader does not know is taken at its word; all else is damage.
+fn named(reason: String, error: &Error) -> Fault {
+    match error {
+        Error::Format(
+            FormatError::UnsupportedVersion(_)
+            | FormatError::InvalidLayoutVersion(_)
+            | FormatError::UnsupportedFilter(_)
+            | FormatError::UnsupportedVirtualLayout
+            | FormatError::UnsupportedExternalStorage,
+        ) => Fault::Unsupported { reason },
+        _ => Fault::Damaged { reason },
+    }
 }

@@ -43,7 +43,7 @@ pub struct Exported {
 pub fn export(checkpoint: &Checkpoint, data: &Dataset) -> Result<Exported, ExportError> {
     let config = &checkpoint.config;
     let actor = Model::new(config, data.state_dim(), data.action_dim()).actor;
-    let parameters = &checkpoint.state.parameters.actor[..];
+    let parameters = checkpoint.state.flying_actor();
     let normaliser = Normaliser::new(data, config.normalize_states);
     let manifest = manifest(checkpoint, &actor, data);
 

@@ -24,6 +24,11 @@ impl<T: Scalar> Adam<T> {
         Self { rate, steps: 0, first: vec![T::zero(); len], second: vec![T::zero(); len] }
     }
 
+    /// Replaces the learning rate.
+    pub fn set_rate(&mut self, rate: f64) {
+        self.rate = rate;
+    }
+
     /// One bias-corrected descent step along `gradient`.
     pub fn descend(&mut self, parameters: &mut [T], gradient: &[T]) {
         self.steps += 1;

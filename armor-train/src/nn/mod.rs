@@ -37,6 +37,15 @@ pub fn accumulate<T: Scalar>(sum: &mut [T], part: &[T]) {
     }
 }
 
+/// Scales `gradient` down to the Euclidean norm `limit` where it is longer; a limit of 0 is none.
+pub fn clip_norm<T: Scalar>(gradient: &mut [T], limit: f64) {
+    let norm = dot(gradient, gradient).sqrt();
+    if limit > 0.0 && norm > limit {
+        let factor = T::of(limit / norm);
+        gradient.iter_mut().for_each(|entry| *entry *= factor);
+    }
+}
+
 /// The inner product of two parameter-sized vectors, in f64.
 pub fn dot<T: Scalar>(a: &[T], b: &[T]) -> f64 {
     // Eight running sums let the loop vectorise; their order is fixed.
@@ -50,4 +59,25 @@ pub fn dot<T: Scalar>(a: &[T], b: &[T]) -> f64 {
     }
     let rest: f64 = a_rest.iter().zip(b_rest).map(|(a, b)| a.to_f64() * b.to_f64()).sum();
     sums.iter().sum::<f64>() + rest
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_long_gradient_is_shortened_and_a_short_one_kept() {
+        let mut gradient = [3.0f64, -4.0];
+        clip_norm(&mut gradient, 10.0);
+        clip_norm(&mut gradient, 0.0);
+        assert_eq!(gradient, [3.0, -4.0]);
+        clip_norm(&mut gradient, 1.0);
+        assert!((gradient[0] - 0.6).abs() < 1e-12 && (gradient[1] + 0.8).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_inner_product_is_that_of_all_entries() {
+        let a: Vec<f64> = (0..19).map(f64::from).collect();
+        assert_eq!(dot(&a, &a), 18.0 * 19.0 * 37.0 / 6.0);
+    }
 }

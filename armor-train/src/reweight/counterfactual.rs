@@ -8,12 +8,12 @@ use crate::critic::{Critic, CriticTape, Task};
 use crate::nn::Scalar;
 
 /// Settings of Eqs. 8 and 9 (Table 2).
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Counterfactual {
     /// `K`, perturbed actions for each transition.
     pub perturbations: usize,
-    /// `sigma`, standard deviation of a perturbation.
-    pub sigma: f64,
+    /// `sigma`, standard deviation of a perturbation of each action entry `[A]`.
+    pub sigma: Vec<f64>,
     /// `w_max`, cap of a weight.
     pub max: f64,
     /// Share of the new value in the moving average over refreshes.
@@ -22,13 +22,15 @@ pub struct Counterfactual {
 
 impl Counterfactual {
     /// The safety margins of Eq. 8 into `margin` `[B]`:
-    /// `m = [max_k Q_cS(s, kappa, a^(k)) - kappa]_+ [Q_cS(s, kappa, a) <= kappa]`,
+    /// `m = [max_k Q_cS(s, kappa, a^(k)) - bound]_+ [Q_cS(s, kappa, a) <= bound]`,
     /// with `a^(k) = clip(a + eps^(k), -1, 1)` and `draw(k, sample, out)` giving
-    /// standard normal draws. `Q_cS` is the larger twin of the live critic.
+    /// standard normal draws. `Q_cS` is the larger twin of the live critic; the
+    /// paper's `bound` `[B]` is kappa.
     pub fn margins<T: Scalar>(
         &self,
         (critic, parameters): (&Critic, &[T]),
         (state, kappa, action): (&DMatrix<T>, &[T], &DMatrix<T>),
+        bound: &[T],
         draw: &(impl Fn(usize, usize, &mut [T]) + ?Sized),
         tape: &mut CriticTape<T>,
         margin: &mut [T],
@@ -40,20 +42,21 @@ impl Counterfactual {
         let recorded = risk(action);
         let mut worst = vec![T::of(f64::NEG_INFINITY); margin.len()];
         let mut perturbed = action.clone();
-        let (sigma, one) = (T::of(self.sigma), T::one());
+        let one = T::one();
         for k in 0..self.perturbations {
             for (sample, mut column) in perturbed.column_iter_mut().enumerate() {
                 draw(k, sample, column.as_mut_slice());
-                for (noise, &action) in column.iter_mut().zip(action.column(sample).iter()) {
-                    *noise = (action + sigma * *noise).max(-one).min(one);
+                let recorded = action.column(sample);
+                for ((noise, &action), &sigma) in column.iter_mut().zip(recorded.iter()).zip(&self.sigma) {
+                    *noise = (action + T::of(sigma) * *noise).max(-one).min(one);
                 }
             }
             for (worst, risk) in worst.iter_mut().zip(risk(&perturbed)) {
                 *worst = worst.max(risk);
             }
         }
-        for (((margin, &kappa), recorded), worst) in margin.iter_mut().zip(kappa).zip(recorded).zip(worst) {
-            *margin = if recorded <= kappa { (worst - kappa).max(T::zero()) } else { T::zero() };
+        for (((margin, &bound), recorded), worst) in margin.iter_mut().zip(bound).zip(recorded).zip(worst) {
+            *margin = if recorded <= bound { (worst - bound).max(T::zero()) } else { T::zero() };
         }
     }
 
@@ -73,7 +76,9 @@ mod tests {
     use super::*;
     use crate::testing::fill;
 
-    const SETTINGS: Counterfactual = Counterfactual { perturbations: 8, sigma: 0.1, max: 2.0, ema: 0.3 };
+    fn settings() -> Counterfactual {
+        Counterfactual { perturbations: 8, sigma: vec![0.1], max: 2.0, ema: 0.3 }
+    }
 
     fn margins(kappa: f64) -> Vec<f64> {
         let critic = Critic::new(2, 1, 6, 5, 1.0);
@@ -83,7 +88,7 @@ mod tests {
         let mut margin = vec![f64::NAN; 6];
         let draw = |k: usize, sample: usize, out: &mut [f64]| out.fill(((k + 3 * sample) as f64).sin());
         let inputs = (&state, &[kappa; 6][..], &action);
-        SETTINGS.margins((&critic, &parameters), inputs, &draw, &mut critic.tape(6), &mut margin);
+        settings().margins((&critic, &parameters), inputs, &[kappa; 6], &draw, &mut critic.tape(6), &mut margin);
         margin
     }
 
@@ -96,7 +101,7 @@ mod tests {
     #[test]
     fn weights_lie_between_one_and_the_cap_and_move_by_the_average() {
         let mut weights = vec![1.0f32; 4];
-        SETTINGS.update(&[0.0, 0.1, 4.0, 9.0], &[0, 1, 2], &mut weights);
+        settings().update(&[0.0, 0.1, 4.0, 9.0], &[0, 1, 2], &mut weights);
         let mean = 4.1 / 3.0;
         let expected = [1.0, 1.0 + 0.3 * 0.1 / mean, 1.3, 1.0];
         for (weight, expected) in weights.iter().zip(expected) {
@@ -107,7 +112,7 @@ mod tests {
     #[test]
     fn without_margins_weights_fall_back_towards_one() {
         let mut weights = vec![2.0f32; 2];
-        SETTINGS.update(&[0.0, 0.0], &[0, 1], &mut weights);
+        settings().update(&[0.0, 0.0], &[0, 1], &mut weights);
         assert!((weights[0] - 1.7).abs() < 1e-6);
     }
 }

@@ -2,9 +2,13 @@
 //! is to imitate most.
 
 pub mod counterfactual;
+pub mod reference;
+mod refresh;
 pub mod trajectory;
 
 use crate::data::Dataset;
+
+pub use refresh::Reweighting;
 
 /// Guards the division by a mean of zero (Eqs. 9 and 10).
 pub const EPSILON: f64 = 1e-6;
