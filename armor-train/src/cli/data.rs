@@ -18,7 +18,7 @@ pub(super) enum Data {
         /// An HDF5 file in the DSRL layout.
         file: PathBuf,
         /// Cost limit of an episode.
-        #[arg(long, value_name = "D", value_parser = super::limit)]
+        #[arg(long, value_name = "D", value_parser = firmware_sim::cli::limit)]
         limit: CostLimit,
         /// Weight of feasible trajectories (Eq. 6), for the mass they get.
         #[arg(long, default_value_t = Preset::Paper.config("", 0.0).beta)]

@@ -22,7 +22,7 @@ pub(super) struct Evaluate {
     #[arg(long, value_parser = Task::named)]
     task: &'static Task,
     /// Cost limits, as in 5,10,20; the paper's limit for the task, if not given.
-    #[arg(long, value_name = "D", value_delimiter = ',', value_parser = super::limit)]
+    #[arg(long, value_name = "D", value_delimiter = ',', value_parser = firmware_sim::cli::limit)]
     limit: Vec<CostLimit>,
     /// Episodes at each limit.
     #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..))]

@@ -25,7 +25,7 @@ pub(super) struct Fit {
     #[arg(long)]
     task: String,
     /// Cost limit of an episode.
-    #[arg(long, value_name = "D", value_parser = super::limit)]
+    #[arg(long, value_name = "D", value_parser = firmware_sim::cli::limit)]
     limit: CostLimit,
     /// What the options start from.
     #[arg(long, default_value = "quick")]
@@ -87,7 +87,7 @@ pub(super) fn train(
     resume: bool,
     output: Output,
 ) -> Result<Outcome, RunError> {
-    let start = if resume { Checkpoint::read(folder)?.state.step } else { 0 };
+    let start = if resume && folder.join(Checkpoint::FILE).exists() { Checkpoint::read(folder)?.state.step } else { 0 };
     let mut progress = Progress::new(label, start, config.steps, output);
     let outcome = run::fit(config, data, folder, resume, &mut progress);
     progress.finish();

@@ -10,7 +10,6 @@ mod run_folder;
 
 use std::process::ExitCode;
 
-use armor_core::units::CostLimit;
 use clap::{Parser, Subcommand};
 use firmware_sim::cli::output::{self, Output};
 
@@ -46,11 +45,6 @@ pub fn main() -> ExitCode {
         Command::Export(command) => command.run(output),
         Command::Evaluate(command) => command.run(output),
     })
-}
-
-/// A cost limit as an argument.
-fn limit(text: &str) -> Result<CostLimit, Box<dyn std::error::Error + Send + Sync>> {
-    Ok(CostLimit::new(text.parse()?)?)
 }
 
 #[cfg(test)]

@@ -34,9 +34,12 @@ impl Checkpoint {
     /// The last checkpoint of the run in `folder`.
     ///
     /// # Errors
-    /// [`RunError::File`] and [`RunError::Checkpoint`].
+    /// [`RunError::NoRun`], [`RunError::File`] and [`RunError::Checkpoint`].
     pub fn read(folder: &Path) -> Result<Self, RunError> {
         let path = folder.join(Self::FILE);
+        if !path.exists() {
+            return Err(RunError::NoRun { folder: folder.into() });
+        }
         let bytes = file::read(&path)?;
         Self::decode(&bytes).ok_or(RunError::Checkpoint { path })
     }
@@ -80,6 +83,13 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         checkpoint().write(folder.path()).unwrap();
         assert_eq!(Checkpoint::read(folder.path()).unwrap(), checkpoint());
+    }
+
+    #[test]
+    fn a_folder_without_a_run_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let error = Checkpoint::read(folder.path()).unwrap_err();
+        assert!(matches!(&error, RunError::NoRun { .. }), "{error}");
     }
 
     #[test]

@@ -73,6 +73,12 @@ pub enum RunError {
         /// The folder.
         folder: PathBuf,
     },
+    /// The folder holds no run.
+    #[error("{} holds no run; name the folder that was given to fit as --out", folder.display())]
+    NoRun {
+        /// The folder.
+        folder: PathBuf,
+    },
     /// The checkpoint is damaged or not one.
     #[error("{} is no whole checkpoint of this version; restore a copy, or start the run anew", path.display())]
     Checkpoint {

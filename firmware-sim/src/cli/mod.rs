@@ -58,7 +58,10 @@ fn task(name: &str) -> Result<&'static Task, TaskError> {
 }
 
 /// A cost limit as an argument.
-fn limit(text: &str) -> Result<CostLimit, Box<dyn std::error::Error + Send + Sync>> {
+///
+/// # Errors
+/// What is wrong with the text, for clap to show.
+pub fn limit(text: &str) -> Result<CostLimit, Box<dyn std::error::Error + Send + Sync>> {
     Ok(CostLimit::new(text.parse()?)?)
 }
 
