@@ -14,6 +14,7 @@
 //! - *incurred*: the cost of the step before, as the robot reports it;
 //! - *tick*: the control step of the episode, from 0; with the seed it
 //!   addresses the noise, so a step can be repeated bit for bit;
+//! - *rung*: one of the image's chains; a shorter one answers sooner and worse;
 //! - *fallback*: the action that the image names for when none can be computed;
 //! - *fault*: why the step was not an ordinary one.
 
@@ -25,7 +26,7 @@ use armor_core::units::{Cost, CostLimit};
 use nalgebra::SVector;
 
 use crate::denoiser::Denoiser;
-use crate::policy::{LoadError, Policy, RUNG};
+use crate::policy::{LoadError, Policy};
 use crate::sampler::{NotFinite, Sampler};
 
 /// A policy in flight: its numbers in flash, its budget, and all the memory it works in.
@@ -48,8 +49,8 @@ pub struct Step<const ACTION: usize> {
     pub action: SVector<f32, ACTION>,
     /// The budget left after the incurred cost was charged.
     pub kappa: Cost,
-    /// Which of the image's chains flew.
-    pub rung: usize,
+    /// Which of the image's chains flew; none where the action is the fallback.
+    pub rung: Option<usize>,
     /// Why the step was not an ordinary one.
     ///
     /// Where two faults coincide, the one that decided the action is named: the
@@ -67,6 +68,9 @@ pub enum Fault {
     /// The incurred cost was negative, NaN or infinite. The whole budget was
     /// charged, and the action is the policy's at kappa 0.
     InvalidCost,
+    /// Every chain of the policy takes more steps than the call allowed; the
+    /// action is the fallback.
+    NoRung,
     /// The network answered with a NaN or an infinity; the action is the fallback.
     ActionNotFinite,
 }
@@ -77,6 +81,7 @@ impl fmt::Display for Fault {
             Self::StateLength => "state has the wrong length; the fallback action was taken, check the sensors' layout",
             Self::StateNotFinite => "state is not finite; the fallback action was taken, check the sensors",
             Self::InvalidCost => "incurred cost is no cost; the whole budget was charged, check the cost monitor",
+            Self::NoRung => "no chain is as short as allowed; the fallback action was taken, export a shorter rung",
             Self::ActionNotFinite => {
                 "the network's answer is not finite; the fallback action was taken, check the state's range"
             }
@@ -126,13 +131,20 @@ impl<'a, const STATE: usize, const ACTION: usize, const HIDDEN: usize> Controlle
     }
 
     /// One control step: charges `incurred`, the cost of the step before (0 on
-    /// the first), then answers `state` `[S]` with an action.
+    /// the first), then answers `state` `[S]` with an action, by the policy's
+    /// longest chain.
     pub fn step(&mut self, state: &[f32], incurred: f32) -> Step<ACTION> {
+        self.step_within(state, incurred, usize::MAX)
+    }
+
+    /// As [`Controller::step`], by the longest chain of at most `steps` calls
+    /// of the denoiser: the caller knows how many its deadline leaves time for.
+    pub fn step_within(&mut self, state: &[f32], incurred: f32, steps: usize) -> Step<ACTION> {
         let charged = self.budget.charge(incurred);
 
         let mut action = SVector::<f32, ACTION>::zeros();
         let entries = action.as_mut_slice().get_mut(..usize::from(self.policy.shape.action)).unwrap_or_default();
-        let acted = self.act(state, entries);
+        let acted = self.act(state, steps, entries);
         if acted.is_err() {
             for (entry, fallback) in entries.iter_mut().zip(self.policy.sections.action_fallback) {
                 *entry = *fallback;
@@ -141,7 +153,7 @@ impl<'a, const STATE: usize, const ACTION: usize, const HIDDEN: usize> Controlle
         self.tick = self.tick.wrapping_add(1);
 
         let fault = acted.err().or(charged.err().map(|_| Fault::InvalidCost));
-        Step { action, kappa: self.kappa(), rung: RUNG, fault }
+        Step { action, kappa: self.kappa(), rung: acted.ok(), fault }
     }
 
     /// What is left of the budget.
@@ -149,17 +161,19 @@ impl<'a, const STATE: usize, const ACTION: usize, const HIDDEN: usize> Controlle
         self.budget.remaining()
     }
 
-    /// Computes the policy's action at this tick and budget, into `action` `[A]`.
-    fn act(&mut self, state: &[f32], action: &mut [f32]) -> Result<(), Fault> {
+    /// Computes the policy's action at this tick and budget, into `action`
+    /// `[A]`; returns the rung that flew.
+    fn act(&mut self, state: &[f32], steps: usize, action: &mut [f32]) -> Result<usize, Fault> {
         if state.len() != usize::from(self.policy.shape.state) {
             return Err(Fault::StateLength);
         }
         if state.iter().any(|value| !value.is_finite()) {
             return Err(Fault::StateNotFinite);
         }
+        let rung = self.policy.rung_within(steps).ok_or(Fault::NoRung)?;
         self.denoiser.prepare(&self.policy, state, self.budget.remaining());
-        self.sampler.run(&self.policy, &mut self.denoiser, &self.noise, self.tick, action)?;
-        Ok(())
+        self.sampler.run((&self.policy, rung), &mut self.denoiser, (&self.noise, self.tick), action)?;
+        Ok(rung)
     }
 }
 

@@ -2,13 +2,10 @@
 
 use core::fmt;
 
-use armor_core::image::{KappaRange, PolicyImage, Precision, Sections};
+use armor_core::image::{KappaRange, MAX_RUNGS, PolicyImage, Precision, Sections};
 use armor_core::schedule::ChainStep;
 use armor_core::shape::Shape;
 use armor_core::units::{Cost, CostLimit};
-
-/// The rung that the controller flies: the image's first, which is its longest.
-pub(crate) const RUNG: usize = 0;
 
 /// A view of a policy's numbers in the bytes of its image.
 ///
@@ -18,8 +15,8 @@ pub struct Policy<'a> {
     pub(crate) shape: Shape,
     pub(crate) kappa: KappaRange,
     pub(crate) sections: Sections<'a>,
-    /// The steps of [`RUNG`].
-    chain: &'a [[u32; ChainStep::WORDS]],
+    /// The steps of each rung; empty where the image has no such rung.
+    chains: [&'a [[u32; ChainStep::WORDS]]; MAX_RUNGS],
 }
 
 /// Why a policy cannot fly on this controller.
@@ -100,7 +97,7 @@ impl<'a> Policy<'a> {
             shape: manifest.shape,
             kappa: manifest.kappa,
             sections: *image.sections(),
-            chain: image.sections().chain_words(manifest, RUNG),
+            chains: core::array::from_fn(|rung| image.sections().chain_words(manifest, rung)),
         })
     }
 
@@ -109,9 +106,20 @@ impl<'a> Policy<'a> {
         &self.shape
     }
 
-    /// The steps of the chain that the controller flies.
-    pub(crate) fn chain(&self) -> impl ExactSizeIterator<Item = ChainStep> + use<'a> {
-        self.chain.iter().map(|words| ChainStep::from_words(*words))
+    /// Calls of the denoiser that each rung takes, longest first.
+    pub fn rungs(&self) -> impl Iterator<Item = usize> + use<'a> {
+        self.chains.into_iter().map(<[_]>::len).filter(|&steps| steps > 0)
+    }
+
+    /// The longest rung of at most `steps` calls of the denoiser.
+    pub fn rung_within(&self, steps: usize) -> Option<usize> {
+        self.rungs().position(|length| length <= steps)
+    }
+
+    /// The steps of a rung; none if there is no such rung.
+    pub(crate) fn chain(&self, rung: usize) -> impl ExactSizeIterator<Item = ChainStep> + use<'a> {
+        let chain = self.chains.get(rung).copied().unwrap_or_default();
+        chain.iter().map(|words| ChainStep::from_words(*words))
     }
 
     /// Whether buffers of these capacities hold every vector of the network.

@@ -28,7 +28,7 @@ impl<const ACTION: usize> Sampler<ACTION> {
         Self { eps: [0.0; ACTION], z: [0.0; ACTION] }
     }
 
-    /// Runs the policy's chain on a prepared denoiser, into `action` `[A]`.
+    /// Runs a rung of the policy on a prepared denoiser, into `action` `[A]`.
     ///
     /// # Errors
     /// [`NotFinite`] if an estimate of the action was not finite before it was
@@ -36,10 +36,9 @@ impl<const ACTION: usize> Sampler<ACTION> {
     /// last step of a chain is the clipped estimate itself.
     pub(crate) fn run<const STATE: usize, const HIDDEN: usize>(
         &mut self,
-        policy: &Policy<'_>,
+        (policy, rung): (&Policy<'_>, usize),
         denoiser: &mut Denoiser<STATE, HIDDEN>,
-        noise: &Noise,
-        tick: u64,
+        (noise, tick): (&Noise, u64),
         action: &mut [f32],
     ) -> Result<(), NotFinite> {
         let bounds = || policy.sections.action_low.iter().zip(policy.sections.action_high);
@@ -47,7 +46,7 @@ impl<const ACTION: usize> Sampler<ACTION> {
         let z = front(&mut self.z, action.len());
 
         noise.fill_normal(0, tick, action);
-        for (stream, step) in (1..).zip(policy.chain()) {
+        for (stream, step) in (1..).zip(policy.chain(rung)) {
             denoiser.eps(policy, step.n, action, eps);
             for ((a, eps), (low, high)) in action.iter_mut().zip(&*eps).zip(bounds()) {
                 *a = denoise(&step, *a, *eps, *low, *high)?;
@@ -103,7 +102,8 @@ mod tests {
         let image = fixture.image();
         let policy = Policy::load(&image).unwrap();
         let mut action = std::vec![0.0; SMALL.action.into()];
-        Sampler::<4>::new().run(&policy, &mut Denoiser::<8, 16>::new(), &Noise::new(SEED), TICK, &mut action).unwrap();
+        let (mut denoiser, noise) = (Denoiser::<8, 16>::new(), Noise::new(SEED));
+        Sampler::<4>::new().run((&policy, 0), &mut denoiser, (&noise, TICK), &mut action).unwrap();
         action
     }
 

@@ -37,6 +37,9 @@ pub struct FlightPlan {
     pub seed: u64,
     /// Control steps a second: the task's rate, or a whole fraction of it.
     pub rate_hz: u32,
+    /// Calls of the denoiser that an action may take: each control step flies
+    /// the policy's longest rung within them.
+    pub max_steps: usize,
 }
 
 /// Why a policy cannot fly a task.
@@ -187,7 +190,7 @@ fn fly_episode(plant: &mut dyn Plant, controller: &mut HostController<'_>, plan:
     while steps_left > 0 {
         plant.observe(&mut state);
         let started = Instant::now();
-        let step = controller.step(&state, incurred as f32);
+        let step = controller.step_within(&state, incurred as f32, plan.max_steps);
         let latency = started.elapsed();
 
         let (mut reward, mut cost) = (0.0, 0.0);

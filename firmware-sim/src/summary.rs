@@ -125,7 +125,7 @@ mod tests {
     use crate::task::Task;
 
     fn episode(reward: f64, cost: f64, latency_us: u64, fault: Option<Fault>) -> Episode {
-        let step = Step { action: Default::default(), kappa: Default::default(), rung: 0, fault };
+        let step = Step { action: Default::default(), kappa: Default::default(), rung: Some(0), fault };
         Episode {
             ticks: vec![Tick { time: Micros(0), step, reward, cost, latency: Duration::from_micros(latency_us) }],
         }
@@ -135,7 +135,7 @@ mod tests {
     fn scores_are_means_over_episodes_and_eq_17() {
         let task = Task::named("ball-run").unwrap();
         let limit = CostLimit::new(5.0).unwrap();
-        let plan = FlightPlan { task, limit, episodes: 2, seed: 3, rate_hz: 30 };
+        let plan = FlightPlan { task, limit, episodes: 2, seed: 3, rate_hz: 30, max_steps: usize::MAX };
         let fault = Some(Fault::InvalidCost);
         let episodes = [episode(task.reward_min, 4.0, 33_333, None), episode(task.reward_max, 8.0, 33_334, fault)];
         let latency = episodes.iter().flat_map(|episode| &episode.ticks).map(|tick| tick.latency).collect();

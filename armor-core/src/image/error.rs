@@ -28,7 +28,7 @@ pub enum ImageError {
     Manifest,
     /// A dimension is zero or larger than the format allows.
     Shape,
-    /// The denoising chains are missing, too long, or do not end at the action.
+    /// The denoising chains are missing, too long, not in the order of their length, or do not end at the action.
     Chain,
     /// The scale of the cost budget is not a finite positive number.
     KappaRange,

@@ -26,7 +26,7 @@ pub struct Manifest<'a> {
     pub kappa: KappaRange,
     /// The noise schedule behind the chains.
     pub schedule: VpSchedule,
-    /// The chains that the policy may fly, longest first.
+    /// The chains that the policy may fly, none longer than the one before.
     pub rungs: Vec<Rung, MAX_RUNGS>,
     /// Where the policy comes from.
     pub provenance: Provenance<'a>,
@@ -180,6 +180,9 @@ impl<'a> Manifest<'a> {
             return Err(ImageError::Chain);
         }
         if self.rungs.iter().any(|rung| !(1..=self.shape.steps).contains(&rung.steps)) {
+            return Err(ImageError::Chain);
+        }
+        if !self.rungs.is_sorted_by(|longer, shorter| longer.steps >= shorter.steps) {
             return Err(ImageError::Chain);
         }
         if !(self.kappa.scale.is_finite() && self.kappa.scale > 0.0) {

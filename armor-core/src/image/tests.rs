@@ -146,6 +146,7 @@ fn a_manifest_out_of_range_is_named() {
     assert_eq!(resealed(|manifest| manifest.shape.hidden = 1025), Err(ImageError::Shape));
     assert_eq!(resealed(|manifest| manifest.schedule.steps = 8), Err(ImageError::Chain));
     assert_eq!(resealed(|manifest| manifest.rungs.clear()), Err(ImageError::Chain));
+    assert_eq!(resealed(|manifest| manifest.rungs.reverse()), Err(ImageError::Chain));
     assert_eq!(resealed(|manifest| manifest.rungs[0].steps = 0), Err(ImageError::Chain));
     assert_eq!(resealed(|manifest| manifest.rungs[0].steps = 8), Err(ImageError::Chain));
     for scale in [0.0, -1.0, f32::NAN, f32::INFINITY] {

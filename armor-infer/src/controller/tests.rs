@@ -107,7 +107,8 @@ fn every_fault_gives_its_action() {
     assert_ne!(policy_at_zero, fallback);
     let check = |parts: Parts, state: &[f32], cost, fault, action, kappa| {
         let step = fly(parts, |controller| controller.step(state, cost));
-        assert_eq!(step, Step { action, kappa: Cost::from_incurred(kappa).unwrap(), rung: 0, fault: Some(fault) });
+        let rung = (fault == Fault::InvalidCost).then_some(0);
+        assert_eq!(step, Step { action, kappa: Cost::from_incurred(kappa).unwrap(), rung, fault: Some(fault) });
     };
     check(parts(), &STATE[..2], 1.0, Fault::StateLength, fallback, 2.0);
     check(parts(), &[0.0; 4], 0.0, Fault::StateLength, fallback, 3.0);
@@ -123,16 +124,22 @@ fn every_fault_gives_its_action() {
 }
 
 #[test]
-fn the_first_rung_flies() {
-    let action = |rungs: &[(Kind, u16)]| {
+fn the_longest_rung_within_the_callers_steps_flies() {
+    let flown = |rungs: &[(Kind, u16)], steps: usize| {
         let mut parts = parts();
         parts.set_rungs(rungs);
-        fly(parts, |controller| controller.step(&STATE, 0.0).action)
+        fly(parts, |controller| controller.step_within(&STATE, 0.0, steps))
     };
-    let (ddpm, ddim) = ((Kind::Ddpm, 5), (Kind::Ddim, 2));
-    assert_eq!(action(&[ddpm, ddim]), action(&[ddpm]));
-    assert_eq!(action(&[ddim, ddpm]), action(&[ddim]));
-    assert_ne!(action(&[ddpm]), action(&[ddim]));
+    let ladder = [(Kind::Ddpm, 5), (Kind::Ddim, 3), (Kind::Ddim, 1)];
+    for (steps, rung) in [(usize::MAX, 0), (5, 0), (4, 1), (3, 1), (2, 2), (1, 2)] {
+        let step = flown(&ladder, steps);
+        assert_eq!((step.rung, step.fault), (Some(rung), None));
+        assert_eq!(step.action, flown(&ladder[rung..=rung], usize::MAX).action);
+    }
+    let none = flown(&ladder, 0);
+    assert_eq!((none.rung, none.fault, none.action), (None, Some(Fault::NoRung), SVector::from(FALLBACK)));
+    let all = fly(parts(), |controller| (controller.step(&STATE, 0.0), controller.kappa()));
+    assert_eq!(all, fly(parts(), |controller| (controller.step_within(&STATE, 0.0, usize::MAX), controller.kappa())));
 }
 
 #[test]

@@ -24,6 +24,10 @@ pub(super) struct Evaluate {
     /// Cost limits, as in 5,10,20; the paper's limit for the task, if not given.
     #[arg(long, value_name = "D", value_delimiter = ',', value_parser = firmware_sim::cli::limit)]
     limit: Vec<CostLimit>,
+    /// Calls of the denoiser that an action may take, which picks the rung; no
+    /// limit, if not given.
+    #[arg(long, value_name = "N", default_value_t = usize::MAX, hide_default_value = true)]
+    max_steps: usize,
     /// Episodes at each limit.
     #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..))]
     episodes: u32,
@@ -51,7 +55,14 @@ impl Evaluate {
         let limits = if self.limit.is_empty() { vec![CostLimit::new(task.cost_limit)?] } else { self.limit };
         let mut flights = Vec::new();
         for limit in limits {
-            let plan = FlightPlan { task, limit, episodes: self.episodes, seed: self.seed, rate_hz: task.rate_hz };
+            let plan = FlightPlan {
+                task,
+                limit,
+                episodes: self.episodes,
+                seed: self.seed,
+                rate_hz: task.rate_hz,
+                max_steps: self.max_steps,
+            };
             flights.push(fly(&image, &plan)?.summary);
         }
         output.report(&Report { policy: self.policy, flights })

@@ -146,7 +146,7 @@ impl Quickstart {
         let booted = flash_and_boot(exported.bytes.as_slice(), &chip)?;
 
         let policy = PolicyImage::new_checked(booted.image.as_slice())?;
-        let plan = FlightPlan { task, limit, episodes: EPISODES, seed, rate_hz: task.rate_hz };
+        let plan = FlightPlan { task, limit, episodes: EPISODES, seed, rate_hz: task.rate_hz, max_steps: usize::MAX };
         let flight = fly(&policy, &plan)?;
         let verification = verify(exported.bytes.as_slice(), seed);
         Ok(SeedReport {

@@ -22,6 +22,8 @@ use crate::model::Model;
 use crate::normaliser::Normaliser;
 use crate::run::Checkpoint;
 
+/// Steps of the rungs below the trained chain.
+const SHORTER: [u16; 4] = [10, 5, 2, 1];
 /// Episodes of the flight behind the quality card, as in the paper (Table 3).
 const QUALITY_EPISODES: u16 = 20;
 /// Bytes of an image beyond its sections: header, manifest and padding are far below.
@@ -48,7 +50,7 @@ pub fn export(checkpoint: &Checkpoint, data: &Dataset) -> Result<Exported, Expor
     let manifest = manifest(checkpoint, &actor, data);
 
     // A trace without rows, to have an image that the controller can fly.
-    let draft = build(&manifest, &sections(&actor, parameters, &normaliser, &[0; 4]))?;
+    let draft = build(&manifest, &sections(&actor, parameters, &normaliser, &manifest.rungs, &[0; 4]))?;
     let image = PolicyImage::new_checked(draft.as_slice()).map_err(armor_core::image::WriteError::Invalid)?;
     let policy = Policy::load(&image)?;
     let limit = flyable_limit(config, &manifest);
@@ -60,24 +62,35 @@ pub fn export(checkpoint: &Checkpoint, data: &Dataset) -> Result<Exported, Expor
 
     let quality = quality(&image, limit, config.seed)?;
     let manifest = Manifest { agreement_max_abs: agreement.agreement_max_abs, quality, ..manifest };
-    let bytes = build(&manifest, &sections(&actor, parameters, &normaliser, &trace))?;
+    let bytes = build(&manifest, &sections(&actor, parameters, &normaliser, &manifest.rungs, &trace))?;
     Ok(Exported { bytes, agreement })
 }
 
-/// How the policy flies on the task's native plant; empty where there is none.
+/// The ladder of a network with `steps` noise levels: the trained chain, then shorter deterministic ones.
+fn ladder(steps: u16) -> FixedVec<Rung, MAX_RUNGS> {
+    let trained = Rung { sampler: Sampler::Ddpm, steps };
+    let shorter = SHORTER.into_iter().filter(|&length| length < steps);
+    [trained].into_iter().chain(shorter.map(|steps| Rung { sampler: Sampler::Ddim, steps })).collect()
+}
+
+/// How each rung flies on the task's native plant; empty where there is none.
 fn quality(image: &PolicyImage<'_>, limit: CostLimit, seed: u64) -> Result<FixedVec<Quality, MAX_RUNGS>, ExportError> {
     let native = Task::named(image.manifest().task).ok().filter(|task| task.plant().is_ok());
     let Some(task) = native else { return Ok(FixedVec::new()) };
-    let plan = FlightPlan { task, limit, episodes: QUALITY_EPISODES.into(), seed, rate_hz: task.rate_hz };
-    let summary = fly(image, &plan)?.summary;
-    let card = Quality {
-        rung: 0,
-        limit: limit.cost(),
-        episodes: QUALITY_EPISODES,
-        reward_normalized: summary.reward_normalized as f32,
-        cost_normalized: summary.cost_normalized as f32,
-    };
-    Ok([card].into_iter().collect())
+    let flown = image.manifest().rungs.iter().enumerate().map(|(rung, chain)| {
+        let max_steps = chain.steps.into();
+        let plan =
+            FlightPlan { task, limit, episodes: QUALITY_EPISODES.into(), seed, rate_hz: task.rate_hz, max_steps };
+        let summary = fly(image, &plan)?.summary;
+        Ok(Quality {
+            rung: rung as u8,
+            limit: limit.cost(),
+            episodes: QUALITY_EPISODES,
+            reward_normalized: summary.reward_normalized as f32,
+            cost_normalized: summary.cost_normalized as f32,
+        })
+    });
+    flown.collect()
 }
 
 /// The trained limit, or the largest budget of the data where that is smaller.
@@ -106,7 +119,7 @@ fn manifest<'a>(checkpoint: &'a Checkpoint, actor: &Actor, data: &Dataset) -> Ma
             trained_max: Cost::from_incurred(data.max_kappa()).unwrap_or(Cost::MAX),
         },
         schedule: actor.schedule,
-        rungs: [Rung { sampler: Sampler::Ddpm, steps: shape.steps }].into_iter().collect(),
+        rungs: ladder(shape.steps),
         provenance: Provenance {
             version: env!("CARGO_PKG_VERSION"),
             preset: config.preset.name(),

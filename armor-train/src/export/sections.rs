@@ -3,8 +3,7 @@
 //! The trainer keeps a layer's weights `outputs x inputs`, column by column,
 //! which is the image's order, input by input.
 
-use armor_core::image::{SECTION_COUNT, SectionKind};
-use armor_core::schedule::Sampler;
+use armor_core::image::{Rung, SECTION_COUNT, SectionKind};
 
 use crate::actor::Actor;
 use crate::nn::Linear;
@@ -15,6 +14,7 @@ pub(super) fn sections(
     actor: &Actor,
     parameters: &[f32],
     normaliser: &Normaliser,
+    rungs: &[Rung],
     golden: &[u32],
 ) -> [Vec<u32>; SECTION_COUNT] {
     let denoiser = &actor.denoiser;
@@ -42,8 +42,8 @@ pub(super) fn sections(
         SectionKind::Hidden3 => layer(&body[1]),
         SectionKind::Output => layer(&body[2]),
         SectionKind::Chain => {
-            let chain = actor.schedule.chain(Sampler::Ddpm, actor.schedule.steps);
-            chain.flat_map(|step| step.to_f32().to_words()).collect()
+            let chain = |rung: &Rung| actor.schedule.chain(rung.sampler, rung.steps.into());
+            rungs.iter().flat_map(chain).flat_map(|step| step.to_f32().to_words()).collect()
         }
         SectionKind::Golden => golden.to_vec(),
     })

@@ -32,6 +32,10 @@ pub(super) struct Run {
     /// whole fraction of it.
     #[arg(long, value_name = "HZ")]
     rate: Option<u32>,
+    /// Calls of the denoiser that an action may take, which picks the rung; no
+    /// limit, if not given.
+    #[arg(long, value_name = "N", default_value_t = usize::MAX, hide_default_value = true)]
+    max_steps: usize,
     /// Cost that an episode may incur; the paper's limit for the task, if not given.
     #[arg(long, value_name = "D", value_parser = super::limit)]
     limit: Option<CostLimit>,
@@ -72,7 +76,8 @@ impl Run {
         let task = self.task;
         let limit = self.limit.map_or_else(|| CostLimit::new(task.cost_limit), Ok)?;
         let rate_hz = self.rate.unwrap_or(task.rate_hz);
-        let plan = FlightPlan { task, limit, episodes: self.episodes, seed: self.seed, rate_hz };
+        let plan =
+            FlightPlan { task, limit, episodes: self.episodes, seed: self.seed, rate_hz, max_steps: self.max_steps };
 
         let boot = Chip::read(&self.chip)?.boot()?;
         if let Some(fault) = boot.passed_over {

@@ -68,13 +68,14 @@ impl Trace {
         if let Some(fault) = step.fault {
             output.note(fault);
         }
-        let chain = Reference::new(&image).chain(step.rung, &state, step.kappa, self.seed, 0);
+        let rung = step.rung.unwrap_or_default();
+        let chain = Reference::new(&image).chain(rung, &state, step.kappa, self.seed, 0);
         let controller_action: Vec<f32> = step.action.iter().take(chain.action.len()).copied().collect();
         let differences = controller_action.iter().zip(&chain.action).map(|(a, b)| (f64::from(*a) - b).abs());
         let agreement_max_abs = differences.fold(0.0, f64::max);
         output.report(&Report {
             task: manifest.task.into(),
-            rung: step.rung,
+            rung,
             seed: self.seed,
             tick: 0,
             kappa: step.kappa.to_f32(),

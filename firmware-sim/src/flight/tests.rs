@@ -9,7 +9,7 @@ use crate::telemetry;
 
 fn plan(episodes: u32) -> FlightPlan {
     let limit = CostLimit::new(5.0).unwrap();
-    FlightPlan { task: Task::named("ball-run").unwrap(), limit, episodes, seed: 1, rate_hz: 30 }
+    FlightPlan { task: Task::named("ball-run").unwrap(), limit, episodes, seed: 1, rate_hz: 30, max_steps: usize::MAX }
 }
 
 fn fly_bytes(bytes: &[u8], plan: &FlightPlan) -> Result<Flight, FlightError> {

@@ -115,7 +115,7 @@ fn largest_difference(image: &PolicyImage<'_>) -> Result<f64, String> {
         if let Some(fault) = step.fault {
             return Err(format!("golden state {tick}: {fault}"));
         }
-        let chain = reference.chain(step.rung, row.state, step.kappa, golden.seed, tick);
+        let chain = reference.chain(step.rung.unwrap_or_default(), row.state, step.kappa, golden.seed, tick);
         let entries = step.action.iter().zip(&chain.action);
         differences.extend(entries.map(|(entry, expected)| (f64::from(*entry) - expected).abs()));
     }
