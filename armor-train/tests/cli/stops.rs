@@ -21,15 +21,47 @@ fn arguments(steps: u64, resume: bool) -> Vec<String> {
     toy("run", steps, &[&REFRESHES, resume].concat())
 }
 
-/// Starts a run, or goes on with it, and waits for two lines of progress: by
-/// the second, the steps up to the first are saved.
-fn started(bench: &Bench, resume: bool) -> (Child, BufReader<ChildStderr>) {
-    let mut command = bench.command(&arguments(ENDLESS, resume));
-    let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-    let mut stderr = BufReader::new(child.stderr.take().unwrap());
-    let lines = stderr.by_ref().lines().map_while(Result::ok);
-    assert_eq!(lines.filter(|line| line.starts_with("training step ")).take(2).count(), 2, "the run ended by itself");
-    (child, stderr)
+/// A run in progress; it is killed when it goes out of scope, so that no failed test leaves one behind.
+struct Running {
+    child: Child,
+    stderr: Option<BufReader<ChildStderr>>,
+}
+
+impl Running {
+    /// Starts a run, or goes on with it, and waits for two lines of progress:
+    /// by the second, the steps up to the first are saved.
+    fn start(bench: &Bench, resume: bool) -> Self {
+        let mut command = bench.command(&arguments(ENDLESS, resume));
+        let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        let mut stderr = BufReader::new(child.stderr.take().unwrap());
+        let lines = stderr.by_ref().lines().map_while(Result::ok);
+        assert_eq!(lines.filter(|line| line.starts_with("training step ")).take(2).count(), 2, "it ended by itself");
+        Self { child, stderr: Some(stderr) }
+    }
+
+    /// SIGKILL, as the kernel sends it when memory runs out.
+    fn kill(mut self) {
+        self.child.kill().unwrap();
+        assert_eq!(self.child.wait().unwrap().code(), None, "it was killed");
+    }
+
+    /// SIGINT, as Ctrl-C sends it: exit code, stdout, and the rest of stderr.
+    fn interrupt(mut self) -> (Option<i32>, String, String) {
+        let signal = Command::new("sh").args(["-c", &format!("kill -INT {}", self.child.id())]).status().unwrap();
+        assert!(signal.success());
+        let [mut stdout, mut stderr] = [(); 2].map(|()| String::new());
+        self.stderr.take().unwrap().read_to_string(&mut stderr).unwrap();
+        self.child.stdout.take().unwrap().read_to_string(&mut stdout).unwrap();
+        (self.child.wait().unwrap().code(), stdout, stderr)
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        // Both fail where it has ended, and that is what is wanted.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
 }
 
 fn steps_done(bench: &Bench) -> u64 {
@@ -53,19 +85,12 @@ fn ends_as_if_never_stopped(bench: &Bench, steps: u64) {
 #[test]
 fn an_interrupted_run_saves_says_how_to_go_on_and_ends_as_if_never_stopped() {
     let bench = Bench::new();
-    let (mut child, mut stderr) = started(&bench, false);
-    let signal = Command::new("sh").args(["-c", &format!("kill -INT {}", child.id())]).status().unwrap();
-    assert!(signal.success());
-    let mut rest = String::new();
-    stderr.read_to_string(&mut rest).unwrap();
-    let mut stdout = String::new();
-    child.stdout.take().unwrap().read_to_string(&mut stdout).unwrap();
-    assert_eq!((child.wait().unwrap().code(), stdout.as_str()), (Some(1), ""), "{rest}");
-
+    let (code, stdout, stderr) = Running::start(&bench, false).interrupt();
+    assert_eq!((code, stdout.as_str()), (Some(1), ""), "{stderr}");
     let steps = steps_done(&bench);
     assert!(steps >= 2000);
     let expected = format!("error: stopped and saved at step {steps}; the same command with --resume goes on");
-    assert_eq!(rest.lines().last(), Some(&*expected));
+    assert_eq!(stderr.lines().last(), Some(&*expected));
     ends_as_if_never_stopped(&bench, steps + 150);
 }
 
@@ -75,10 +100,9 @@ fn a_run_that_is_killed_at_any_moment_ends_as_if_never_stopped() {
     let bench = Bench::new();
     let mut done = 0;
     for round in 0..3 {
-        let (mut child, _stderr) = started(&bench, round > 0);
+        let running = Running::start(&bench, round > 0);
         thread::sleep(Duration::from_millis(37 * round));
-        child.kill().unwrap();
-        assert_eq!(child.wait().unwrap().code(), None, "it was killed");
+        running.kill();
         let steps = steps_done(&bench);
         assert!(steps > done && steps.is_multiple_of(1000), "{steps} after {done}");
         done = steps;
@@ -90,19 +114,17 @@ fn a_run_that_is_killed_at_any_moment_ends_as_if_never_stopped() {
 #[test]
 fn a_run_that_is_killed_while_it_writes_ends_as_if_never_stopped() {
     let bench = Bench::new();
-    let (mut child, stderr) = started(&bench, false);
+    let mut running = Running::start(&bench, false);
     // Progress is read, so that the run never waits for its reader, and so that a run that writes in place is found out.
+    let stderr = running.stderr.take().unwrap();
     let (sender, progress) = mpsc::channel();
-    let reader = thread::spawn(move || stderr.lines().map_while(Result::ok).try_for_each(|line| sender.send(line)));
+    thread::spawn(move || stderr.lines().map_while(Result::ok).try_for_each(|line| sender.send(line)));
     let mut lines = 0;
     while !bench.names("run").iter().any(|name| name.ends_with(".part")) {
         lines += progress.try_iter().count();
         assert!(lines < 50, "in 50 checkpoints no file was seen aside");
     }
-    child.kill().unwrap();
-    child.wait().unwrap();
-    drop(progress);
-    let _ = reader.join().unwrap();
+    running.kill();
 
     let steps = steps_done(&bench);
     assert!(steps.is_multiple_of(1000), "{steps}");
