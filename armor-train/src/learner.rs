@@ -7,9 +7,10 @@ use serde::{Deserialize, Serialize};
 use crate::actor::ActorLoss;
 use crate::batch::Batch;
 use crate::config::Config;
+use crate::critic::Task;
 use crate::data::Dataset;
 use crate::model::{Model, Optimisers, Parameters};
-use crate::nn::Scalar;
+use crate::nn::{Scalar, dot};
 use crate::normaliser::Normaliser;
 use crate::reweight::counterfactual::Counterfactual;
 use crate::reweight::{Refresh, Weights};
@@ -55,6 +56,12 @@ pub struct Metrics {
     pub critic: CriticMetrics,
     /// The actor's and the dual's update, means over the batch.
     pub actor: ActorLoss,
+    /// Smallest and largest `Q_r` of the batch at the policy's actions.
+    pub reward_range: [f64; 2],
+    /// Smallest and largest `Q_cL` of the batch at the policy's actions.
+    pub long_cost_range: [f64; 2],
+    /// Euclidean norms of the gradients that the optimisers saw: critic, actor, dual.
+    pub gradient_norms: [f64; 3],
 }
 
 impl<'d, T: Scalar> Learner<'d, T> {
@@ -122,12 +129,21 @@ impl<'d, T: Scalar> Learner<'d, T> {
         let (model, workers) = (&self.model, &mut self.workers);
 
         let orders = pcgrad::orders([a, b, c]);
-        let (critic, _) = update_critic(model, parameters, optimisers, workers, &chain(stream::TARGET_CHAIN), &orders);
-        let (actor, _) = update_actor(model, parameters, optimisers, workers, &chain(stream::POLICY_CHAIN));
+        let (critic, critic_gradient) =
+            update_critic(model, parameters, optimisers, workers, &chain(stream::TARGET_CHAIN), &orders);
+        let (actor, [actor_gradient, dual_gradient]) =
+            update_actor(model, parameters, optimisers, workers, &chain(stream::POLICY_CHAIN));
         update_target(parameters, self.config.target_rate);
 
         self.state.step += 1;
-        Metrics { critic, actor }
+        let range = |task| range(self.workers.iter().flat_map(|worker| worker.policy_values(task)));
+        Metrics {
+            critic,
+            actor,
+            reward_range: range(Task::Reward),
+            long_cost_range: range(Task::LongCost),
+            gradient_norms: [critic_gradient, actor_gradient, dual_gradient].map(|g| dot(&g, &g).sqrt()),
+        }
     }
 
     /// Draws a batch of uniform transitions with replacement, and the noise of behaviour cloning.
@@ -201,6 +217,20 @@ impl<'d, T: Scalar> Learner<'d, T> {
         &self.weights
     }
 
+    /// `lambda(kappa)` at budgets in units of recorded cost.
+    pub fn lambda<const N: usize>(&self, kappas: [f64; N]) -> [f64; N] {
+        let dual = &self.model.dual;
+        let scaled = kappas.map(|kappa| T::of(kappa * self.config.cost_scale));
+        let mut tape = dual.tape(N);
+        dual.forward(&self.state.parameters.dual, &scaled, &mut tape);
+        std::array::from_fn(|place| tape.lambda[place].to_f64())
+    }
+
+    /// Refreshes of the weights so far.
+    pub const fn refreshes(&self) -> u64 {
+        self.refresh.done(self.state.step)
+    }
+
     /// All that changes from step to step.
     pub const fn state(&self) -> &LearnerState<T> {
         &self.state
@@ -235,6 +265,13 @@ impl Source<'_> {
         batch.next_kappa[sample] = scaled(data.kappa_next(row), self.config.cost_scale);
         batch.alive[sample] = if data.done(row) { T::zero() } else { T::one() };
     }
+}
+
+/// The smallest and the largest of some values.
+fn range<T: Scalar>(values: impl Iterator<Item = T>) -> [f64; 2] {
+    values
+        .map(T::to_f64)
+        .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| [low.min(value), high.max(value)])
 }
 
 /// Standard normal draws of a stream and tick, as the controller would draw them.

@@ -11,7 +11,7 @@ use crate::config::Config;
 use crate::learner::LearnerState;
 
 /// The first bytes of a checkpoint, with its version.
-const MAGIC: &[u8; 8] = b"ARMRCK01";
+const MAGIC: &[u8; 8] = b"ARMRCK02";
 const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
 
 /// A run at one moment.
