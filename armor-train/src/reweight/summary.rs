@@ -15,7 +15,7 @@ pub struct WeightSummary {
 
 impl WeightSummary {
     /// The quantiles, from the smallest weight to the largest.
-    pub const QUANTILES: [f64; 7] = [0.0, 0.1, 0.25, 0.5, 0.75, 0.9, 1.0];
+    pub const QUANTILES: [f64; 7] = [0.0, 0.1, 0.5, 0.9, 0.95, 0.99, 1.0];
 
     /// Counts all weights.
     pub fn new(weights: &Weights) -> Self {
@@ -41,7 +41,7 @@ mod tests {
         };
         let summary = WeightSummary::new(&weights);
         assert_eq!(summary.active, 0.2);
-        let expected = [1.0, 1.4, 2.0, 3.0, 4.0, 4.6, 5.0];
+        let expected = [1.0, 1.4, 3.0, 4.6, 4.8, 4.96, 5.0];
         for (quantile, expected) in summary.quantiles.iter().zip(expected) {
             assert!((quantile - expected).abs() < 1e-12);
         }

@@ -71,24 +71,28 @@ impl Cause {
         }
     }
 
+    /// The usual reason.
+    pub const fn reason(self) -> &'static str {
+        match self {
+            Self::RewardCritic | Self::CostCritic => "values of actions that the data lacks feed on themselves",
+            Self::LambdaCap => "at that budget no action satisfies Q_cL <= kappa, often by the critic's noise alone",
+            Self::DeadWeights => "almost no perturbed action leaves the budget, so Eq. 8 selects nothing",
+            Self::NotFinite => "steps too large, or values too large for single precision",
+        }
+    }
+
     /// What to try; names of options stand in backticks.
     pub const fn remedy(self) -> &'static str {
         match self {
-            Self::RewardCritic => {
-                "values of actions that the data lacks feed on themselves: a smaller `critic_rate` or `target_rate`, or a smaller `eta`"
-            }
-            Self::CostCritic => {
-                "values of actions that the data lacks feed on themselves: a smaller `critic_rate` or `target_rate`, or a smaller `long_cost_discount`"
-            }
+            Self::RewardCritic => "a smaller `critic_rate` or `target_rate`, or a smaller `eta`",
+            Self::CostCritic => "a smaller `critic_rate` or `target_rate`, or a smaller `long_cost_discount`",
             Self::LambdaCap => {
-                "at that budget no action satisfies Q_cL <= kappa, often by the critic's noise alone: a smaller `dual_rate`, or a `kappa_scale` of 1 over the cost limit so that the dual network can tell budgets apart"
+                "a smaller `dual_rate`, or a `kappa_scale` of 1 over the cost limit so that the dual network can tell budgets apart"
             }
             Self::DeadWeights => {
-                "almost no perturbed action leaves the budget, so Eq. 8 selects nothing: a larger `sigma`, or a larger `short_cost_discount` so that Q_cS can exceed a whole unit of cost"
+                "a larger `sigma`, or a larger `short_cost_discount` so that Q_cS can exceed a whole unit of cost"
             }
-            Self::NotFinite => {
-                "a smaller `critic_rate` and `actor_rate`, or a smaller `reward_scale` where rewards are large"
-            }
+            Self::NotFinite => "a smaller `critic_rate` and `actor_rate`, or a smaller `reward_scale`",
         }
     }
 }
@@ -117,7 +121,7 @@ pub struct Alarm {
 impl fmt::Display for Alarm {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { step, cause, finding } = self;
-        write!(f, "step {step}: {}: {finding}; try {}", cause.title(), cause.remedy())
+        write!(f, "step {step}: {}: {finding}; {}; try {}", cause.title(), cause.reason(), cause.remedy())
     }
 }
 

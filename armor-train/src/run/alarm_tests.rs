@@ -50,7 +50,7 @@ fn an_alarm_says_what_when_how_much_and_what_to_try() {
     let mut alarms = alarms();
     let found = alarms.look(&row(&[("step", 700.0), ("q_reward_max", 50.0)]))[0].to_string();
     let expected =
-        "step 700: the reward critic explodes: Q_r reaches 50.0, 25.0 times the largest of the data, 2.0; try ";
+        "step 700: the reward critic explodes: Q_r reaches 50.0, 25.0 times the largest of the data, 2.0; values of ";
     assert!(found.starts_with(expected), "{found}");
     assert_eq!(alarms.text(), found + "\n");
 }

@@ -100,10 +100,10 @@ pub const COLUMNS: &[Column] = &[
         |r| r.weights.quantiles[0],
     ),
     column("weight_p10", "weight", "10 % quantile of w", |r| r.weights.quantiles[1]),
-    column("weight_p25", "weight", "lower quartile of w", |r| r.weights.quantiles[2]),
-    column("weight_p50", "weight", "median of w", |r| r.weights.quantiles[3]),
-    column("weight_p75", "weight", "upper quartile of w", |r| r.weights.quantiles[4]),
-    column("weight_p90", "weight", "90 % quantile of w", |r| r.weights.quantiles[5]),
+    column("weight_p50", "weight", "median of w", |r| r.weights.quantiles[2]),
+    column("weight_p90", "weight", "90 % quantile of w", |r| r.weights.quantiles[3]),
+    column("weight_p95", "weight", "95 % quantile of w", |r| r.weights.quantiles[4]),
+    column("weight_p99", "weight", "99 % quantile of w", |r| r.weights.quantiles[5]),
     column("weight_max", "weight", "largest w", |r| r.weights.quantiles[6]),
 ];
 
@@ -153,10 +153,11 @@ mod tests {
             "\n## alarms.log\n\n\
              One line for each alarm, at its first occurrence; empty if there is none. The same line goes to stderr. \
              Alarms but the last do not stop a run.\n\n\
-             | alarm | raised when | what to try |\n|---|---|---|\n",
+             | alarm | raised when | usual reason | what to try |\n|---|---|---|---|\n",
         );
         for cause in Cause::ALL {
-            let _ = writeln!(text, "| {} | {} | {} |", cause.title(), cause.rule(), cause.remedy());
+            let _ =
+                writeln!(text, "| {} | {} | {} | {} |", cause.title(), cause.rule(), cause.reason(), cause.remedy());
         }
         text.push_str(
             "\n## provenance.json\n\n\

@@ -64,7 +64,7 @@ fn a_run_leaves_its_rows_its_speed_and_its_origin() {
     let origin: Provenance = serde_json::from_str(&read(folder.path(), Provenance::FILE)).unwrap();
     assert_eq!((origin.data_sha256, origin.seed), ("05".repeat(32), config().seed));
     assert_eq!((origin.transitions, origin.trajectories, origin.max_kappa), (30, 6, 2.0));
-    assert_eq!(origin.cost_to_go, Provenance::new(&config(), &data()).cost_to_go);
+    assert!((origin.cost_to_go.max - (1.0 + 0.99f64.powi(3))).abs() < 1e-12);
 }
 
 #[test]

@@ -182,10 +182,10 @@ mod tests {
             ("counterfactual_active", 0.25),
             ("weight_min", 0.1),
             ("weight_p10", 0.2),
-            ("weight_p25", 0.3),
-            ("weight_p50", 0.4),
-            ("weight_p75", 0.5),
-            ("weight_p90", 0.6),
+            ("weight_p50", 0.3),
+            ("weight_p90", 0.4),
+            ("weight_p95", 0.5),
+            ("weight_p99", 0.6),
             ("weight_max", 0.7),
         ] {
             assert_eq!(value(&row, name), expected, "{name}");
