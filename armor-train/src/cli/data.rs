@@ -21,7 +21,7 @@ pub(super) enum Data {
         #[arg(long, value_name = "D", value_parser = firmware_sim::cli::limit)]
         limit: CostLimit,
         /// Weight of feasible trajectories (Eq. 6), for the mass they get.
-        #[arg(long, default_value_t = Preset::Paper.config("", 0.0).beta)]
+        #[arg(long, default_value_t = Preset::Paper.config("", 0.0).beta, value_parser = beta)]
         beta: f64,
     },
     /// Name every fault of a file.
@@ -43,9 +43,6 @@ impl Data {
     pub(super) fn run(self, output: Output) -> CommandResult {
         match self {
             Self::Stats { file, limit, beta } => {
-                if !(beta.is_finite() && beta >= 0.0) {
-                    return Err("--beta must be a number of at least 0".into());
-                }
                 let data = read(&file, output)?;
                 output.report(&Stats::new(&data, limit, beta))
             }
@@ -62,6 +59,11 @@ impl Data {
             Self::Calibrate { file, task } => output.report(&calibrate(&read(&file, output)?, task)?),
         }
     }
+}
+
+/// A weight of feasible trajectories as an argument.
+fn beta(text: &str) -> Result<f64, &'static str> {
+    text.parse().ok().filter(|beta| (0.0..f64::INFINITY).contains(beta)).ok_or("it must be a number of at least 0")
 }
 
 /// Reads a file, and tells what is odd about it.

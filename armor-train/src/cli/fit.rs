@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use super::progress::Progress;
 use crate::config::options::{self, OPTIONS};
-use crate::config::{Config, Preset};
+use crate::config::{Config, ConfigError, Preset};
 use crate::data::Dataset;
 use crate::run::{self, Checkpoint, Outcome, RunError};
 
@@ -32,10 +32,10 @@ pub(super) struct Fit {
 #[derive(Debug, clap::Args)]
 struct Train {
     /// An HDF5 file in the DSRL layout.
-    #[arg(long)]
+    #[arg(long, value_name = "H5")]
     data: PathBuf,
     /// The task that was recorded, such as ball-run.
-    #[arg(long)]
+    #[arg(long, value_name = "T")]
     task: String,
     /// Cost limit of an episode.
     #[arg(long, value_name = "D", value_parser = firmware_sim::cli::limit)]
@@ -102,7 +102,18 @@ impl fmt::Display for Listing {
 
 impl Train {
     fn run(self, output: Output) -> CommandResult {
+        let config = self.config().unwrap_or_else(|error| super::misuse(&error));
         let data = super::data::read(&self.data, output)?;
+        let started = std::time::Instant::now();
+        let outcome = train("training", &config, &data, &self.out, self.resume, output)?;
+        if let Outcome::Stopped(step) = outcome {
+            return Err(format!("stopped and saved at step {step}; the same command with --resume goes on").into());
+        }
+        output.report(&Report { out: self.out, steps: config.steps, seconds: started.elapsed().as_secs_f64() })
+    }
+
+    /// The configuration that the arguments say.
+    fn config(&self) -> Result<Config, ConfigError> {
         let mut config = self.preset.config(&self.task, f64::from(self.limit.cost().to_f32()));
         config.seed = self.seed;
         config.steps = self.steps.unwrap_or(config.steps);
@@ -110,12 +121,8 @@ impl Train {
             config.set(assignment)?;
         }
         config.data = absolute(&self.data);
-        let started = std::time::Instant::now();
-        let outcome = train("training", &config, &data, &self.out, self.resume, output)?;
-        if let Outcome::Stopped(step) = outcome {
-            return Err(format!("stopped and saved at step {step}; the same command with --resume goes on").into());
-        }
-        output.report(&Report { out: self.out, steps: config.steps, seconds: started.elapsed().as_secs_f64() })
+        config.check()?;
+        Ok(config)
     }
 }
 

@@ -8,9 +8,11 @@ mod progress;
 mod quickstart;
 mod run_folder;
 
+use std::fmt::Display;
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::error::ErrorKind;
+use clap::{CommandFactory, Parser, Subcommand};
 use firmware_sim::cli::output::{self, Output};
 
 /// Learn a safe robot policy from recorded data, and export it for a microcontroller.
@@ -47,10 +49,13 @@ pub fn main() -> ExitCode {
     })
 }
 
+/// Ends the process as clap does on bad usage, where clap itself could not see it.
+fn misuse(error: &dyn Display) -> ! {
+    Cli::command().error(ErrorKind::ValueValidation, error).exit()
+}
+
 #[cfg(test)]
 mod tests {
-    use clap::CommandFactory;
-
     use super::*;
 
     #[test]

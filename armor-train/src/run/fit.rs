@@ -79,7 +79,6 @@ fn start<'d>(
     folder: &Path,
     resume: bool,
 ) -> Result<(Learner<'d, f32>, Window, Record), RunError> {
-    std::fs::create_dir_all(folder).map_err(|source| RunError::Folder { folder: folder.into(), source })?;
     let provenance = Provenance::new(config, data);
     let exists = folder.join(Checkpoint::FILE).exists();
     match (resume, exists) {
@@ -96,6 +95,7 @@ fn start<'d>(
             Ok((learner, checkpoint.window, record))
         }
         (false, false) => {
+            std::fs::create_dir_all(folder).map_err(|source| RunError::Folder { folder: folder.into(), source })?;
             write_config(config, folder)?;
             let learner = Learner::new(config.clone(), data);
             let (window, record) = (Window::default(), Record::new(config, data, &provenance, &learner));
@@ -107,8 +107,11 @@ fn start<'d>(
     }
 }
 
-/// Options in which a resumed run may differ: it may go on longer, and its data may have been moved.
-const FREE: [&str; 2] = ["steps", "data"];
+/// Whether a resumed run may differ in an option: its data may have been moved,
+/// and it may go on longer, unless its rates fall along its length.
+fn is_free(key: &str, config: &Config) -> bool {
+    key == "data" || key == "steps" && config.final_rate == 1.0
+}
 
 /// Whether a checkpoint may go on under `config`.
 fn same_run(checkpoint: &Checkpoint, config: &Config, data: &Dataset, folder: &Path) -> Result<(), RunError> {
@@ -116,11 +119,13 @@ fn same_run(checkpoint: &Checkpoint, config: &Config, data: &Dataset, folder: &P
         return Err(RunError::OtherData { folder: folder.into() });
     }
     let (before, now) = (checkpoint.config.options(), config.options());
-    let differs = |key: &str, value| !FREE.contains(&key) && before.get(key) != Some(value);
-    let differing = now.iter().find(|(key, value)| differs(key, value));
-    match differing {
-        Some((key, _)) => Err(RunError::OtherConfig { folder: folder.into(), key: key.clone() }),
-        None => Ok(()),
+    let differs = |key: &str, value| !is_free(key, config) && before.get(key) != Some(value);
+    if let Some((key, _)) = now.iter().find(|(key, value)| differs(key, value)) {
+        return Err(RunError::OtherConfig { folder: folder.into(), key: key.clone() });
+    }
+    match checkpoint.state.step {
+        done if done > config.steps => Err(RunError::Longer { folder: folder.into(), done }),
+        _ => Ok(()),
     }
 }
 

@@ -25,6 +25,8 @@ mod table;
 use std::path::PathBuf;
 
 use firmware_sim::file::FileError;
+use firmware_sim::host;
+use firmware_sim::task::Task;
 
 use crate::config::{Config, ConfigError};
 use crate::data::{DataError, Dataset};
@@ -74,6 +76,16 @@ pub enum RunError {
         /// Action entries of the task.
         expected_action: usize,
     },
+    /// No controller could fly the policy, and so it could not be exported.
+    #[error("a policy with {size} {what} could not be exported; {capacity} is the most that a controller here flies")]
+    TooLarge {
+        /// What there is too much of.
+        what: &'static str,
+        /// How much.
+        size: usize,
+        /// The most that is flown.
+        capacity: usize,
+    },
     /// The folder already holds a run.
     #[error("{} already holds a run; add --resume to go on with it, or choose another --out", folder.display())]
     Taken {
@@ -105,6 +117,14 @@ pub enum RunError {
         folder: PathBuf,
         /// The first option that differs.
         key: String,
+    },
+    /// The run has gone on for longer.
+    #[error("the run in {} has done {done} steps; resume it with at least as many", folder.display())]
+    Longer {
+        /// The folder.
+        folder: PathBuf,
+        /// Steps that it has done.
+        done: u64,
     },
     /// The checkpoint comes from other data.
     #[error("the run in {} was started with other data; resume it with the file it was started with", folder.display())]
@@ -138,20 +158,33 @@ pub enum RunError {
     },
 }
 
-/// Whether data has the sizes of the task that a configuration names.
+/// Whether data has the sizes of the task that a configuration names, and
+/// whether the controller that exports the policy could fly it.
 ///
 /// # Errors
 /// [`RunError::Sizes`]. A name that is no task of the table is the user's own, and has any size.
+/// [`RunError::TooLarge`]
 pub fn check_sizes(config: &Config, data: &Dataset) -> Result<(), RunError> {
-    let Ok(task) = firmware_sim::task::Task::named(&config.task) else { return Ok(()) };
-    if (task.state, task.action) == (data.state_dim(), data.action_dim()) {
-        return Ok(());
+    if let Ok(task) = Task::named(&config.task)
+        && (task.state, task.action) != (data.state_dim(), data.action_dim())
+    {
+        return Err(RunError::Sizes {
+            task: config.task.clone(),
+            state: data.state_dim(),
+            action: data.action_dim(),
+            expected_state: task.state,
+            expected_action: task.action,
+        });
     }
-    Err(RunError::Sizes {
-        task: config.task.clone(),
-        state: data.state_dim(),
-        action: data.action_dim(),
-        expected_state: task.state,
-        expected_action: task.action,
-    })
+    let sizes = [
+        ("state entries", data.state_dim(), host::STATE),
+        ("action entries", data.action_dim(), host::ACTION),
+        ("`hidden` units", config.hidden, host::HIDDEN),
+        ("`kappa_hidden` units", config.kappa_hidden, host::HIDDEN),
+        ("`kappa_embedding` entries", config.kappa_embedding, host::HIDDEN),
+    ];
+    match sizes.into_iter().find(|(_, size, capacity)| size > capacity) {
+        Some((what, size, capacity)) => Err(RunError::TooLarge { what, size, capacity }),
+        None => Ok(()),
+    }
 }

@@ -63,7 +63,7 @@ pub(crate) fn made_up() -> Dataset {
 
 /// The `paper` preset with small networks, and more options.
 pub(crate) fn config(options: &[&str]) -> Config {
-    let mut config = Preset::Paper.config("ball-run", 5.0);
+    let mut config = Preset::Paper.config("ball-run", LIMIT.into());
     for option in SMALL.iter().chain(options) {
         config.set(option).unwrap();
     }
@@ -125,6 +125,11 @@ impl Watch for Stop {
     }
 }
 
+/// Cost limit, seed and training steps of [`policy`].
+pub(crate) const LIMIT: f32 = 5.0;
+pub(crate) const SEED: u64 = 3;
+pub(crate) const STEPS: u64 = 400;
+
 /// A policy that was trained and exported.
 pub(crate) struct Policy {
     pub(crate) checkpoint: Checkpoint,
@@ -136,9 +141,10 @@ pub(crate) struct Policy {
 pub(crate) fn policy() -> &'static Policy {
     static POLICY: OnceLock<Policy> = OnceLock::new();
     POLICY.get_or_init(|| {
-        let options = ["steps=400", "seed=3", "normalize_states=true", "actor_rate=0.01", "eta=0.01"];
+        let mut config = config(&["normalize_states=true", "actor_rate=0.01", "eta=0.01"]);
+        (config.seed, config.steps) = (SEED, STEPS);
         let run = Run::new();
-        assert_eq!(run.fit(&config(&options), shipped(), None), Outcome::Done);
+        assert_eq!(run.fit(&config, shipped(), None), Outcome::Done);
         let checkpoint = run.checkpoint();
         let exported = export(&checkpoint, shipped()).unwrap();
         Policy { checkpoint, exported }

@@ -3,29 +3,28 @@
 
 use armor_core::image::PolicyImage;
 use armor_core::noise::Noise;
-use armor_core::schedule::Sampler;
 use armor_core::units::CostLimit;
-use armor_infer::golden;
+use armor_infer::{Policy, golden};
 use armor_train::actor::chain::Chain;
 use armor_train::export::{AGREEMENT_BOUND, AGREEMENT_SAMPLES};
 use armor_train::model::Model;
 use armor_train::normaliser::Normaliser;
 use firmware_sim::chip::{Boot, Chip, Slot};
 use firmware_sim::file;
-use firmware_sim::flight::{Flight, FlightPlan, fly};
+use firmware_sim::flight::{FlightPlan, fly};
+use firmware_sim::host::HostController;
+use firmware_sim::image_file::ImageFile;
 use firmware_sim::task::Task;
 use firmware_sim::verify::verify;
 use nalgebra::DMatrix;
 
-use crate::fixture::{Run, policy, shipped};
+use crate::fixture::{LIMIT, Run, SEED, STEPS, policy, shipped};
 
-const LIMIT: f32 = 5.0;
-
-fn flown(image: &[u8]) -> Flight {
+/// Two episodes at the limit, by the longest chain.
+fn plan() -> FlightPlan {
     let task = Task::named("ball-run").unwrap();
     let limit = CostLimit::new(LIMIT).unwrap();
-    let plan = FlightPlan { task, limit, episodes: 2, seed: 1, rate_hz: task.rate_hz };
-    fly(&PolicyImage::new_checked(image).unwrap(), &plan).unwrap()
+    FlightPlan { task, limit, episodes: 2, seed: 1, rate_hz: task.rate_hz, max_steps: usize::MAX }
 }
 
 /// Writes the image to a file and a chip to another, reads both back, and boots.
@@ -33,7 +32,7 @@ fn flashed_and_booted(image: &[u8]) -> Boot {
     let folder = Run::new();
     let (image_file, chip_file) = (folder.path("policy.armor"), folder.path("robot.chip"));
     file::write(&image_file, image).unwrap();
-    let read = firmware_sim::image_file::ImageFile::read(&image_file).unwrap();
+    let read = ImageFile::read(&image_file).unwrap();
     let mut chip = Chip::blank();
     chip.flash(read.bytes(), None).unwrap();
     chip.write(&chip_file).unwrap();
@@ -47,7 +46,7 @@ fn the_image_says_what_it_was_made_from() {
     let manifest = image.manifest();
     let provenance = &manifest.provenance;
     assert_eq!((manifest.task, provenance.preset), ("ball-run", "paper"));
-    assert_eq!((provenance.seed, provenance.steps), (3, 400));
+    assert_eq!((provenance.seed, provenance.steps), (SEED, STEPS));
     assert_eq!((&provenance.data_sha256, &checkpoint.data_sha256), (shipped().sha256(), shipped().sha256()));
     let shape = manifest.shape;
     assert_eq!((shape.state, shape.action, shape.steps), (7, 2, 20));
@@ -58,6 +57,20 @@ fn the_image_says_what_it_was_made_from() {
 }
 
 #[test]
+fn a_quality_card_is_a_flight_of_its_rung() {
+    let image = PolicyImage::new_checked(policy().exported.bytes.as_slice()).unwrap();
+    let manifest = image.manifest();
+    assert_eq!(manifest.quality.len(), manifest.rungs.len());
+    for (index, (card, rung)) in manifest.quality.iter().zip(&manifest.rungs).enumerate() {
+        assert_eq!((usize::from(card.rung), card.limit.to_f32(), card.episodes), (index, LIMIT, 20));
+        let plan = FlightPlan { episodes: 20, seed: SEED, max_steps: rung.steps.into(), ..plan() };
+        let summary = fly(&image, &plan).unwrap().summary;
+        let scores = (summary.reward_normalized as f32, summary.cost_normalized as f32);
+        assert_eq!((card.reward_normalized, card.cost_normalized), scores);
+    }
+}
+
+#[test]
 fn trainer_and_image_agree_over_recorded_states_and_budgets() {
     let agreement = policy().exported.agreement;
     assert_eq!(agreement.agreement_samples, AGREEMENT_SAMPLES);
@@ -65,10 +78,10 @@ fn trainer_and_image_agree_over_recorded_states_and_budgets() {
     assert!(agreement.agreement_max_abs <= 1e-4, "{agreement:?}");
 }
 
-/// The trace again, by the trainer's own chain: agreement at every control
-/// step and along a falling budget, not at the first step alone.
+/// Agreement at every control step of the golden trace, along its falling
+/// budget, and of every rung: not at a first step and of the full chain alone.
 #[test]
-fn the_golden_trace_is_what_the_trainer_computes() {
+fn every_rung_is_the_trainers_chain_along_a_falling_budget() {
     let Model { actor, .. } = Model::new(&policy().checkpoint.config, 7, 2);
     let parameters = &policy().checkpoint.state.parameters.actor;
     let normaliser = Normaliser::new(shipped(), true);
@@ -80,16 +93,22 @@ fn the_golden_trace_is_what_the_trainer_computes() {
     let kappa: Vec<f32> = rows.iter().map(|row| row.kappa.to_f32()).collect();
     let mut context = actor.denoiser.context(rows.len());
     actor.denoiser.prepare(parameters, &DMatrix::from_vec(7, rows.len(), state), &kappa, &mut context);
-    let steps = actor.schedule.chain(Sampler::Ddpm, 20).collect();
-    let mut chain = Chain::new(&actor.denoiser, steps, rows.len(), false);
     // Stage 0 is the start of the chain; the tick is the control step.
     let draw = |stage: usize, tick: usize, out: &mut [f32]| {
         Noise::new(trace.seed).fill_normal(stage as u32, tick as u64, out);
     };
-    chain.run(&actor.denoiser, parameters, &context, &draw);
-    for (tick, row) in rows.iter().enumerate() {
-        for (flown, trained) in row.action.iter().zip(chain.action.column(tick).iter()) {
-            assert!((flown - trained).abs() <= AGREEMENT_BOUND, "tick {tick}: {flown} and not {trained}");
+    for (index, rung) in image.manifest().rungs.iter().enumerate() {
+        let steps = actor.schedule.chain(rung.sampler, rung.steps.into()).collect();
+        let mut chain = Chain::new(&actor.denoiser, steps, rows.len(), false);
+        chain.run(&actor.denoiser, parameters, &context, &draw);
+        let loaded = Policy::load(&image).unwrap();
+        let mut controller = HostController::new(loaded, CostLimit::from_cost(trace.limit), trace.seed).unwrap();
+        for (tick, row) in rows.iter().enumerate() {
+            let step = controller.step_within(row.state, row.incurred, rung.steps.into());
+            assert_eq!((step.rung, step.kappa, step.fault), (Some(index), row.kappa, None));
+            for (flown, trained) in step.action.iter().zip(chain.action.column(tick).iter()) {
+                assert!((flown - trained).abs() <= AGREEMENT_BOUND, "rung {index}, tick {tick}: {flown}, {trained}");
+            }
         }
     }
 }
@@ -129,7 +148,7 @@ fn what_boots_is_what_was_exported() {
 #[test]
 fn a_booted_policy_flies_within_its_bounds_and_keeps_its_budget() {
     let booted = flashed_and_booted(policy().exported.bytes.as_slice());
-    let flight = flown(booted.image.as_slice());
+    let flight = fly(&PolicyImage::new_checked(booted.image.as_slice()).unwrap(), &plan()).unwrap();
     assert_eq!((flight.episodes.len(), flight.summary.actions, flight.summary.faults), (2, 200, 0));
     for episode in &flight.episodes {
         let mut kappa = f64::from(LIMIT);

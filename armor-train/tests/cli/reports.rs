@@ -1,0 +1,165 @@
+//! What the commands answer.
+
+use std::io::Read;
+
+use super::*;
+
+#[test]
+fn the_shipped_recording_is_counted() {
+    let bench = Bench::new();
+    let stats = bench.json(&["data", "stats", &shipped(), "--limit", "5"]);
+    assert_eq!((&stats["transitions"], &stats["trajectories"]), (&94_000.into(), &940.into()));
+    for (key, expected) in [("p_nz", 0.363), ("p_feas", 0.130)] {
+        assert!((stats[key].as_f64().unwrap() - expected).abs() < 5e-4, "{key}: {stats}");
+    }
+    assert_eq!(stats["cost_limit"], 5.0);
+    let plain = bench.success(&["data", "stats", &shipped(), "--limit", "5"]);
+    fits_a_terminal(&plain);
+    let words = text(&plain.stdout);
+    for number in ["94000", "940", "0.363", "0.130"] {
+        assert!(words.split_whitespace().any(|word| word == number), "{number} in {words}");
+    }
+}
+
+#[test]
+fn a_sound_file_passes_the_check_and_a_faulty_one_is_told_why() {
+    let bench = Bench::new();
+    let report = bench.json(&["data", "check", "small.hdf5"]);
+    assert_eq!((&report["transitions"], &report["trajectories"]), (&9.into(), &2.into()));
+    assert_eq!(report["faults"].as_array().unwrap().len(), 0);
+    assert_eq!(report["warnings"][0]["warning"], "unfinished_trajectory");
+
+    // The report is printed and the command fails: a script may look at either.
+    bench.put("notes.txt", b"no recording at all");
+    let output = bench.run(&["data", "check", "notes.txt", "--json"]);
+    assert!(error(&output).contains("notes.txt cannot be used"));
+    let report = object(&output);
+    assert_eq!(report["faults"][0]["fault"], "not_hdf5");
+    assert!(report["faults"][0]["message"].as_str().unwrap().starts_with("not an HDF5 file (19 bytes"));
+    let plain = bench.run(&["data", "check", "notes.txt"]);
+    assert!(text(&plain.stdout).contains("fault: not an HDF5 file") && plain.status.code() == Some(1));
+}
+
+/// Rewards to the rounding of the recording, costs exactly.
+#[test]
+fn the_native_plant_is_held_against_the_recording() {
+    let bench = Bench::new();
+    let report = bench.json(&["data", "calibrate", &shipped(), "--task", "ball-run"]);
+    assert_eq!((&report["transitions"], &report["episodes"]), (&94_000.into(), &940.into()));
+    assert_eq!(report["recorded_cost_mismatches"], 0);
+    for way in ["one_step", "replay"] {
+        assert_eq!(report[way]["cost_mismatches"], 0, "{way}");
+        assert!(report[way]["reward_max_abs"].as_f64().unwrap() < 1e-5, "{way}: {report}");
+        assert_eq!(report[way]["observation_max_abs"].as_array().unwrap().len(), 7);
+    }
+    fits_a_terminal(&bench.success(&["data", "calibrate", &shipped(), "--task", "ball-run"]));
+}
+
+#[test]
+fn a_run_is_trained_exported_and_scored() {
+    let bench = Bench::new();
+    let report = bench.json(&ball_run("run", 5));
+    assert_eq!((&report["out"], &report["steps"]), (&"run".into(), &5.into()));
+    assert!(report["seconds"].is_number());
+    assert_eq!(bench.names("run"), ["checkpoint.postcard", "config.toml", "metrics.csv"]);
+    let config = text(&bench.bytes("run/config.toml"));
+    for line in ["preset = \"paper\"", "hidden = 8", "limit = 5.0", "steps = 5", "seed = 0"] {
+        assert!(config.lines().any(|other| other == line), "{line} in {config}");
+    }
+
+    let report = bench.json(&["export", "run", "-o", "policy.armor"]);
+    assert_eq!((&report["image"], &report["precision"]), (&"policy.armor".into(), &"f32".into()));
+    assert_eq!((&report["image_bytes"], &report["steps"]), (&bench.bytes("policy.armor").len().into(), &5.into()));
+    assert!(report["agreement_max_abs"].as_f64().unwrap() <= 1e-4, "{report}");
+    assert_eq!(report["agreement_samples"], 1024);
+
+    // What is scored is what is deployed: the run's folder and its image fly alike.
+    let evaluate = |policy: &str, more: &[&str]| {
+        let arguments = ["evaluate", policy, "--task", "ball-run", "--episodes", "2", "--seed", "7"];
+        let mut report = bench.json(&[&arguments[..], more].concat());
+        for flight in report["flights"].as_array_mut().unwrap() {
+            for key in ["latency_us_p50", "latency_us_p99", "latency_us_max", "deadline_misses"] {
+                assert!(flight.as_object_mut().unwrap().remove(key).unwrap().is_number(), "{key}");
+            }
+        }
+        report
+    };
+    let image = evaluate("policy.armor", &["--limit", "2,5"]);
+    assert_eq!(image["flights"], evaluate("run", &["--limit", "2,5"])["flights"]);
+    assert_eq!((&image["flights"][0]["cost_limit"], &image["flights"][1]["cost_limit"]), (&2.0.into(), &5.0.into()));
+    let flight = &image["flights"][1];
+    assert_eq!((&flight["episodes"], &flight["actions"], &flight["faults"]), (&2.into(), &200.into(), &0.into()));
+    for key in ["reward_normalized", "cost_normalized", "reward_std", "safe_episodes"] {
+        assert!(flight[key].is_number(), "{key}: {flight}");
+    }
+    // Without a limit it is the paper's.
+    assert_eq!(&evaluate("policy.armor", &[])["flights"][0], flight);
+
+    for arguments in [
+        &["export", "run", "-o", "again.armor"][..],
+        &["evaluate", "again.armor", "--task", "ball-run", "--episodes", "1"],
+    ] {
+        fits_a_terminal(&bench.success(arguments));
+    }
+    assert_eq!(bench.bytes("again.armor"), bench.bytes("policy.armor"));
+}
+
+#[test]
+fn a_task_of_the_users_own_is_trained_and_exported_in_any_size() {
+    let bench = Bench::new();
+    fits_a_terminal(&bench.success(&toy("run", 2, &[])));
+    bench.json(&["export", "run", "-o", "toy.armor"]);
+    let error = bench.failure(&["evaluate", "toy.armor", "--task", "ball-run"]);
+    assert!(error.contains("trained for toy and not for ball-run"), "{error}");
+}
+
+#[test]
+fn a_run_finds_its_data_where_it_was_moved_to() {
+    let bench = Bench::new();
+    bench.success(&toy("run", 2, &[]));
+    fs::create_dir(bench.path("archive")).unwrap();
+    fs::rename(bench.path("small.hdf5"), bench.path("archive/moved.hdf5")).unwrap();
+    let error = bench.failure(&["export", "run", "-o", "toy.armor"]);
+    assert!(error.contains("no such file") && error.contains("--data"), "{error}");
+    assert!(!bench.path("toy.armor").exists());
+    bench.json(&["export", "run", "-o", "toy.armor", "--data", "archive/moved.hdf5"]);
+    // A run goes on with it, too.
+    let resumed = fit(["archive/moved.hdf5", "toy", "1"], "run", 4, &["--resume"]);
+    assert_eq!(bench.json(&resumed)["steps"], 4);
+}
+
+#[test]
+fn help_fits_a_terminal() {
+    let bench = Bench::new();
+    for command in [
+        &[][..],
+        &["quickstart"],
+        &["data"],
+        &["data", "stats"],
+        &["data", "check"],
+        &["data", "calibrate"],
+        &["fit"],
+        &["export"],
+        &["evaluate"],
+    ] {
+        for help in ["-h", "--help"] {
+            let output = bench.success(&[command, &[help]].concat());
+            assert!(text(&output.stdout).contains("Usage: armor-train"));
+            fits_a_terminal(&output);
+        }
+    }
+}
+
+/// A pipe whose reader has gone before the result comes.
+#[test]
+fn a_reader_that_left_is_no_panic() {
+    let bench = Bench::new();
+    for arguments in [&["data", "check", "small.hdf5"][..], &["data", "check", "small.hdf5", "--json"], &["--help"]] {
+        let mut child = bench.command(arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        drop(child.stdout.take());
+        let mut stderr = String::new();
+        child.stderr.take().unwrap().read_to_string(&mut stderr).unwrap();
+        assert_eq!(child.wait().unwrap().code(), Some(0), "{stderr}");
+        assert!(!stderr.contains("panicked"), "{stderr}");
+    }
+}

@@ -1,0 +1,110 @@
+//! A run that is interrupted or killed at any moment, and goes on.
+
+use std::io::{BufRead, BufReader, Read};
+use std::process::{Child, ChildStderr};
+use std::sync::mpsc;
+use std::thread;
+use std::time::Duration;
+
+use armor_train::run::Checkpoint;
+
+use super::*;
+
+/// More steps than any of these runs will do: they end by a signal.
+const ENDLESS: u64 = 1 << 40;
+
+/// The weights are refreshed before, at and after the first checkpoint.
+const REFRESHES: [&str; 4] = ["--set", "reweight_warmup=700", "--set", "reweight_interval=300"];
+
+fn arguments(steps: u64, resume: bool) -> Vec<String> {
+    let resume: &[&str] = if resume { &["--resume"] } else { &[] };
+    toy("run", steps, &[&REFRESHES, resume].concat())
+}
+
+/// Starts a run, or goes on with it, and waits for two lines of progress: by
+/// the second, the steps up to the first are saved.
+fn started(bench: &Bench, resume: bool) -> (Child, BufReader<ChildStderr>) {
+    let mut command = bench.command(&arguments(ENDLESS, resume));
+    let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let mut stderr = BufReader::new(child.stderr.take().unwrap());
+    let lines = stderr.by_ref().lines().map_while(Result::ok);
+    assert_eq!(lines.filter(|line| line.starts_with("training step ")).take(2).count(), 2, "the run ended by itself");
+    (child, stderr)
+}
+
+fn steps_done(bench: &Bench) -> u64 {
+    Checkpoint::read(&bench.path("run")).unwrap().state.step
+}
+
+/// Goes on to `steps`; the folder then holds the bytes of a run that was never stopped.
+#[track_caller]
+fn ends_as_if_never_stopped(bench: &Bench, steps: u64) {
+    bench.success(&arguments(steps, true));
+    let straight = Bench::new();
+    // The configuration holds the data's path.
+    let data = bench.path("small.hdf5").display().to_string();
+    straight.success(&fit([&data, "toy", "1"], "run", steps, &REFRESHES));
+    for file in ["config.toml", "metrics.csv"] {
+        assert_eq!(text(&bench.bytes(&format!("run/{file}"))), text(&straight.bytes(&format!("run/{file}"))));
+    }
+    assert!(bench.bytes("run/checkpoint.postcard") == straight.bytes("run/checkpoint.postcard"));
+}
+
+#[test]
+fn an_interrupted_run_saves_says_how_to_go_on_and_ends_as_if_never_stopped() {
+    let bench = Bench::new();
+    let (mut child, mut stderr) = started(&bench, false);
+    let signal = Command::new("sh").args(["-c", &format!("kill -INT {}", child.id())]).status().unwrap();
+    assert!(signal.success());
+    let mut rest = String::new();
+    stderr.read_to_string(&mut rest).unwrap();
+    let mut stdout = String::new();
+    child.stdout.take().unwrap().read_to_string(&mut stdout).unwrap();
+    assert_eq!((child.wait().unwrap().code(), stdout.as_str()), (Some(1), ""), "{rest}");
+
+    let steps = steps_done(&bench);
+    assert!(steps >= 2000);
+    let expected = format!("error: stopped and saved at step {steps}; the same command with --resume goes on");
+    assert_eq!(rest.lines().last(), Some(&*expected));
+    ends_as_if_never_stopped(&bench, steps + 150);
+}
+
+/// Whenever it is, the last checkpoint is whole, and no more than 1000 steps are lost.
+#[test]
+fn a_run_that_is_killed_at_any_moment_ends_as_if_never_stopped() {
+    let bench = Bench::new();
+    let mut done = 0;
+    for round in 0..3 {
+        let (mut child, _stderr) = started(&bench, round > 0);
+        thread::sleep(Duration::from_millis(37 * round));
+        child.kill().unwrap();
+        assert_eq!(child.wait().unwrap().code(), None, "it was killed");
+        let steps = steps_done(&bench);
+        assert!(steps > done && steps.is_multiple_of(1000), "{steps} after {done}");
+        done = steps;
+    }
+    ends_as_if_never_stopped(&bench, done + 150);
+}
+
+/// A file is written aside and renamed; the kill falls while it lies there half done.
+#[test]
+fn a_run_that_is_killed_while_it_writes_ends_as_if_never_stopped() {
+    let bench = Bench::new();
+    let (mut child, stderr) = started(&bench, false);
+    // Progress is read, so that the run never waits for its reader, and so that a run that writes in place is found out.
+    let (sender, progress) = mpsc::channel();
+    let reader = thread::spawn(move || stderr.lines().map_while(Result::ok).try_for_each(|line| sender.send(line)));
+    let mut lines = 0;
+    while !bench.names("run").iter().any(|name| name.ends_with(".part")) {
+        lines += progress.try_iter().count();
+        assert!(lines < 50, "in 50 checkpoints no file was seen aside");
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+    drop(progress);
+    let _ = reader.join().unwrap();
+
+    let steps = steps_done(&bench);
+    assert!(steps.is_multiple_of(1000), "{steps}");
+    ends_as_if_never_stopped(&bench, steps + 150);
+}

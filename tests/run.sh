@@ -1,0 +1,29 @@
+#!/usr/bin/env bash
+# Runs every test of the workspace: units, documentation, integration, the
+# command lines, and the bare-metal builds. Installs a compiler if there is
+# none (Debian, as root). Prints one line for each part, and ends at the first
+# that fails.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+part() {
+    local name=$1 start=$SECONDS
+    shift
+    echo "tests: $name"
+    "$@" || { echo "tests: $name FAILED after $((SECONDS - start)) s"; exit 1; }
+    echo "tests: $name passed in $((SECONDS - start)) s"
+}
+
+install_compiler() {
+    apt-get update &&
+        apt-get install -y --no-install-recommends cargo-web rustc-web gcc libc6-dev
+} >&2
+
+# Where rustup puts it; a shell that is not a login shell may not look there.
+[[ -x ${CARGO_HOME:-$HOME/.cargo}/bin/cargo ]] && PATH=${CARGO_HOME:-$HOME/.cargo}/bin:$PATH
+if ! { command -v cargo && command -v cc; } >/dev/null; then
+    part "installing a compiler" install_compiler
+fi
+
+part "workspace" cargo test --workspace --locked --no-fail-fast
+part "bare metal" tests/bare-metal.sh
