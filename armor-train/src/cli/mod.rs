@@ -6,6 +6,7 @@ mod export;
 mod fit;
 mod progress;
 mod quickstart;
+mod report;
 mod run_folder;
 
 use std::fmt::Display;
@@ -34,6 +35,7 @@ enum Command {
     Fit(fit::Fit),
     Export(export::Export),
     Evaluate(evaluate::Evaluate),
+    Report(report::Report),
 }
 
 /// Runs the command of the process's arguments.
@@ -46,6 +48,7 @@ pub fn main() -> ExitCode {
         Command::Fit(command) => command.run(output),
         Command::Export(command) => command.run(output),
         Command::Evaluate(command) => command.run(output),
+        Command::Report(command) => command.run(output),
     })
 }
 
