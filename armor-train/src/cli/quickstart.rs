@@ -208,6 +208,6 @@ impl fmt::Display for Report {
         writeln!(f, "files in {}", self.out.display())?;
         writeln!(f, "  seed-N/policy.armor         the image: firmware-sim inspect, verify, bench")?;
         writeln!(f, "  seed-N/chip.bin             the flashed chip: firmware-sim run --chip")?;
-        write!(f, "  seed-N                      the training run: armor-train report seed-N -o FILE")
+        write!(f, "  seed-N                      the training run: armor-train report")
     }
 }
