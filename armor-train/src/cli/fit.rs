@@ -8,7 +8,6 @@ use firmware_sim::cli::output::{CommandResult, Output};
 use serde::Serialize;
 
 use super::progress::Progress;
-use crate::config::options::{self, OPTIONS};
 use crate::config::{Config, ConfigError, Preset};
 use crate::data::Dataset;
 use crate::run::{self, Checkpoint, Outcome, RunError};
@@ -18,19 +17,11 @@ use crate::run::{self, Checkpoint, Outcome, RunError};
 /// The run's folder holds its configuration, its metrics and its last
 /// checkpoint. Ctrl-C saves and stops; the same command with --resume goes on.
 ///
-/// Options of the method are listed by --list-options and in docs/config.md,
-/// the columns of the metrics in docs/metrics.md; `armor-train report` draws them.
+/// `armor-train options` and docs/config.md say what can be --set,
+/// docs/metrics.md what the columns of metrics.csv are; `armor-train report`
+/// draws them.
 #[derive(Debug, clap::Args)]
 pub(super) struct Fit {
-    /// Print every option of --set with its meaning and the presets' values.
-    #[arg(long, exclusive = true)]
-    list_options: bool,
-    #[command(flatten)]
-    train: Option<Train>,
-}
-
-#[derive(Debug, clap::Args)]
-struct Train {
     /// An HDF5 file in the DSRL layout.
     #[arg(long, value_name = "H5")]
     data: PathBuf,
@@ -43,7 +34,7 @@ struct Train {
     /// What the options start from.
     #[arg(long, default_value = "quick")]
     preset: Preset,
-    /// Replace an option, as in --set eta=0.5; --list-options says which there are.
+    /// Replace an option, as in --set eta=0.5; `armor-train options` lists them.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     set: Vec<String>,
     /// Training steps; the preset's, if not given.
@@ -67,41 +58,8 @@ struct Report {
     seconds: f64,
 }
 
-#[derive(Serialize)]
-struct Listing {
-    options: Vec<OptionReport>,
-}
-
-#[derive(Serialize)]
-struct OptionReport {
-    key: &'static str,
-    meaning: &'static str,
-}
-
 impl Fit {
     pub(super) fn run(self, output: Output) -> CommandResult {
-        match self.train {
-            Some(train) => train.run(output),
-            None => output.report(&Listing::new()),
-        }
-    }
-}
-
-impl Listing {
-    fn new() -> Self {
-        let entries = OPTIONS.iter().flat_map(|(_, entries)| *entries);
-        Self { options: entries.map(|&(key, meaning)| OptionReport { key, meaning }).collect() }
-    }
-}
-
-impl fmt::Display for Listing {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&options::listing())
-    }
-}
-
-impl Train {
-    fn run(self, output: Output) -> CommandResult {
         let config = self.config().unwrap_or_else(|error| super::misuse(&error));
         let data = super::data::read(&self.data, output)?;
         let started = std::time::Instant::now();

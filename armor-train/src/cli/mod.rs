@@ -4,6 +4,7 @@ mod data;
 mod evaluate;
 mod export;
 mod fit;
+mod options;
 mod progress;
 mod quickstart;
 mod report;
@@ -33,6 +34,7 @@ enum Command {
     #[command(subcommand)]
     Data(data::Data),
     Fit(fit::Fit),
+    Options(options::Options),
     Export(export::Export),
     Evaluate(evaluate::Evaluate),
     Report(report::Report),
@@ -46,6 +48,7 @@ pub fn main() -> ExitCode {
         Command::Quickstart(command) => command.run(output),
         Command::Data(command) => command.run(output),
         Command::Fit(command) => command.run(output),
+        Command::Options(command) => command.run(output),
         Command::Export(command) => command.run(output),
         Command::Evaluate(command) => command.run(output),
         Command::Report(command) => command.run(output),

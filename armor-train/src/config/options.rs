@@ -1,4 +1,4 @@
-//! What every option means: the source of `docs/config.md` and `fit --list-options`.
+//! What every option means: the source of `docs/config.md` and `armor-train options`.
 
 use std::fmt::Write;
 
@@ -152,7 +152,7 @@ pub fn document() -> String {
     let mut text = String::from(
         "# Options of a training run\n\n\
          `armor-train fit --preset paper|quick` starts from a preset, and `--set key=value` replaces any option. \
-         `DIR/config.toml` keeps the effective values. `armor-train fit --list-options` prints this list. \
+         `DIR/config.toml` keeps the effective values. `armor-train options` prints this list. \
          This page is generated; `armor-train/src/config/options.rs` is its source.\n\n\
          Equations, tables and appendices are the paper's. O-n are choices that the paper leaves open; \
          the preset `paper` takes what the public code that the paper builds on does.\n",

@@ -18,7 +18,7 @@ pub(super) struct Chart<'a> {
     pub(super) caption: String,
 }
 
-/// Something drawn in a chart; `colour` is a number below [`COLOURS`].
+/// Something drawn in a chart; one without a label is left out of the legend; `colour` is the number of one in the style sheet.
 pub(super) enum Layer<'a> {
     /// A curve.
     Line { label: String, colour: usize, values: &'a [f64] },
@@ -29,9 +29,6 @@ pub(super) enum Layer<'a> {
     /// A number, at every step.
     Level { label: String, at: f64 },
 }
-
-/// Colours of lines and areas in the style sheet.
-pub(super) const COLOURS: usize = 5;
 
 impl Layer<'_> {
     pub(super) fn label(&self) -> &str {

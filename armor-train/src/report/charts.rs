@@ -3,7 +3,7 @@
 use super::axis::{Scale, label};
 use super::chart::{Chart, Layer};
 use super::folder::RunFolder;
-use crate::data::ToGo;
+use crate::data::{Sorted, ToGo};
 use crate::dual::LOG_RANGE;
 
 /// Charts under one heading.
@@ -55,8 +55,8 @@ fn critic_losses(run: &RunFolder) -> Chart<'_> {
 fn values<'a>(run: &'a RunFolder, columns: [&str; 3], to_go: &ToGo) -> Vec<Layer<'a>> {
     let [low, mean, high] = columns.map(|column| run.metrics.get(column));
     vec![
-        Layer::Band { label: "data, all".to_owned(), low: to_go.min, high: to_go.max },
-        Layer::Band { label: "data, 5 to 95 %".to_owned(), low: to_go.p5, high: to_go.p95 },
+        Layer::Band { label: "data (inner: 5 to 95 %)".to_owned(), low: to_go.min, high: to_go.max },
+        Layer::Band { label: String::new(), low: to_go.p5, high: to_go.p95 },
         Layer::Area { label: "policy, smallest to largest".to_owned(), colour: 0, low, high },
         Layer::Line { label: "policy, mean".to_owned(), colour: 0, values: mean },
     ]
@@ -143,9 +143,14 @@ fn lambda(run: &RunFolder) -> Chart<'_> {
 }
 
 fn penalty(run: &RunFolder) -> Chart<'_> {
+    // The first rows, before lambda has settled, would flatten all that follows.
+    let sorted = Sorted::new(run.metrics.get("penalty").iter().copied());
+    let [low, high] = [0.02, 0.98].map(|q| sorted.quantile(q));
+    let margin = 0.1 * (high - low);
     Chart {
+        ends: Some([low - margin, high + margin]),
         layers: lines(run, &[("penalty", "mean")]),
-        caption: "lambda (Q_cL - kappa) in the actor's loss (Eq. 15). Below 0 the policy has budget to spare."
+        caption: "lambda (Q_cL - kappa) in the actor's loss (Eq. 15). Below 0 the policy has budget to spare. The axis holds the middle 96 % of the rows."
             .to_owned(),
         ..chart(run, "Penalty", "scaled reward", Scale::Linear)
     }
@@ -169,8 +174,8 @@ fn weights(run: &RunFolder) -> Chart<'_> {
         high: get(high),
     };
     let mut layers = vec![
-        area("smallest to largest", 0, "weight_min", "weight_max"),
-        area("10 to 90 %", 0, "weight_p10", "weight_p90"),
+        area("smallest to largest (inner: 10 to 90 %)", 0, "weight_min", "weight_max"),
+        area("", 0, "weight_p10", "weight_p90"),
     ];
     layers.extend(lines(run, &[("weight_p50", "median"), ("weight_p95", "95 %"), ("weight_p99", "99 %")]));
     Chart {
@@ -203,7 +208,7 @@ mod tests {
     use std::collections::BTreeSet;
 
     use super::*;
-    use crate::report::chart::COLOURS;
+    use crate::report::page::STYLE;
     use crate::report::tests::run;
     use crate::run::COLUMNS;
 
@@ -226,16 +231,16 @@ mod tests {
     }
 
     #[test]
-    fn every_layer_has_numbers_a_name_and_a_colour() {
+    fn every_layer_has_numbers_and_a_style() {
         let (_folder, run) = run(3);
         for section in sections(&run) {
             for chart in section.charts {
                 assert!(!chart.caption.is_empty() && !chart.steps.is_empty());
+                assert!(chart.layers.iter().any(|layer| !layer.label().is_empty()));
                 for layer in chart.layers {
-                    assert!(!layer.label().is_empty() && !layer.values().is_empty());
-                    assert!(
-                        (0..COLOURS).any(|c| layer.class().ends_with(&format!("c{c}"))) || !layer.class().contains('c')
-                    );
+                    assert!(!layer.values().is_empty());
+                    let style = format!(".{} {{", layer.class().replace(' ', "."));
+                    assert!(STYLE.contains(&style), "{style}");
                 }
             }
         }

@@ -9,7 +9,7 @@ use super::plot;
 use crate::config::options::{OPTIONS, plain};
 use crate::run::COLUMNS;
 
-const STYLE: &str = include_str!("style.css");
+pub(super) const STYLE: &str = include_str!("style.css");
 
 /// The page of a run, complete in itself.
 pub fn page(run: &RunFolder) -> String {
@@ -55,14 +55,14 @@ fn header(run: &RunFolder, name: &str, out: &mut String) {
     }
     out.push_str("<ul class=\"alarms\">\n");
     for alarm in &run.alarms {
-        let _ = writeln!(out, "<li>{}</li>", escape(alarm));
+        let _ = writeln!(out, "<li>{}</li>", with_code(&escape(alarm)));
     }
     out.push_str("</ul>\n");
 }
 
 fn figure(chart: &Chart<'_>, out: &mut String) {
     let _ = write!(out, "<figure>\n<h3>{}</h3>\n<ul class=\"legend\">", chart.title);
-    for layer in &chart.layers {
+    for layer in chart.layers.iter().filter(|layer| !layer.label().is_empty()) {
         let sample = match layer {
             Layer::Line { .. } | Layer::Level { .. } => "M0 5H18",
             Layer::Area { .. } | Layer::Band { .. } => "M0 0H18V10H0Z",
@@ -154,6 +154,12 @@ fn row(out: &mut String, changed: bool, cells: &[&str]) {
         let _ = write!(out, "<td{class}>{}</td>", escape(cell));
     }
     out.push_str("</tr>\n");
+}
+
+/// Names in backticks as code.
+fn with_code(text: &str) -> String {
+    let parts = text.split('`').enumerate();
+    parts.map(|(place, part)| if place % 2 == 1 { format!("<code>{part}</code>") } else { part.to_owned() }).collect()
 }
 
 /// Text as it may stand in HTML.

@@ -23,7 +23,7 @@ pub(super) fn run(rows: usize) -> (TempDir, RunFolder) {
     let data = recording(2, 3, |_| 1.0, |_| 1.0);
     write(METRICS_FILE, &metrics);
     write(SPEED_FILE, &speed);
-    write(ALARMS_FILE, "step 100: lambda sits at its cap: 148.4 at kappa 0 & 5\n");
+    write(ALARMS_FILE, "step 100: lambda sits at its cap: 148.4 at kappa 0 & 5; try `eta`\n");
     write(CONFIG_FILE, &config.options().to_string());
     write(Provenance::FILE, &serde_json::to_string(&Provenance::new(&config, &data)).unwrap());
     let run = RunFolder::read(folder.path());
@@ -60,7 +60,7 @@ fn a_page_tells_configuration_origin_and_alarms_with_their_special_characters() 
     let (_folder, run) = run(3);
     let page = page(&run);
     assert!(page.contains("ball-&lt;run&gt;, preset quick, cost limit 5, seed 3; 300 of 9000 steps"));
-    assert!(page.contains("<li>step 100: lambda sits at its cap: 148.4 at kappa 0 &amp; 5</li>"));
+    assert!(page.contains("<li>step 100: lambda sits at its cap: 148.4 at kappa 0 &amp; 5; try <code>eta</code></li>"));
     assert!(page.contains(&"05".repeat(32)));
     assert!(page.contains("<tr class=\"changed\"><td>eta</td><td class=\"value\">0.25</td><td>1.0</td>"));
     assert_eq!(page.matches("<tr class=\"changed\">").count(), 2, "eta and seed");
