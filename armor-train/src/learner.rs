@@ -6,9 +6,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::actor::ActorLoss;
 use crate::config::Config;
+use crate::critic::Task;
 use crate::data::Dataset;
 use crate::model::{Model, Optimisers, Parameters};
-use crate::nn::{Scalar, soft_update};
+use crate::nn::{Scalar, dot, soft_update};
 use crate::normaliser::Normaliser;
 use crate::reweight::{Reweighting, Weights};
 use crate::source::Source;
@@ -61,6 +62,12 @@ pub struct Metrics {
     pub critic: CriticMetrics,
     /// The actor's and the dual's update, means over the batch.
     pub actor: ActorLoss,
+    /// Smallest and largest `Q_r` of the batch at the policy's actions.
+    pub reward_range: [f64; 2],
+    /// Smallest and largest `Q_cL` of the batch at the policy's actions.
+    pub long_cost_range: [f64; 2],
+    /// Euclidean norms of the gradients that the optimisers saw: critic, actor, dual.
+    pub gradient_norms: [f64; 3],
 }
 
 impl<'d, T: Scalar> Learner<'d, T> {
@@ -121,13 +128,22 @@ impl<'d, T: Scalar> Learner<'d, T> {
 
         optimisers.schedule(&self.config, step);
         let orders = pcgrad::orders([a, b, c]);
-        let (critic, _) = update_critic(model, parameters, optimisers, workers, &chain(stream::TARGET_CHAIN), &orders);
-        let (actor, _) = update_actor(model, parameters, optimisers, workers, &chain(stream::POLICY_CHAIN));
+        let (critic, critic_gradient) =
+            update_critic(model, parameters, optimisers, workers, &chain(stream::TARGET_CHAIN), &orders);
+        let (actor, [actor_gradient, dual_gradient]) =
+            update_actor(model, parameters, optimisers, workers, &chain(stream::POLICY_CHAIN));
         update_target(parameters, self.config.target_rate);
         soft_update(actor_average, &parameters.actor, T::of(1.0 - self.config.actor_average));
 
         self.state.step += 1;
-        Metrics { critic, actor }
+        let range = |task| range(self.workers.iter().flat_map(|worker| worker.policy_values(task)));
+        Metrics {
+            critic,
+            actor,
+            reward_range: range(Task::Reward),
+            long_cost_range: range(Task::LongCost),
+            gradient_norms: [critic_gradient, actor_gradient, dual_gradient].map(|g| dot(&g, &g).sqrt()),
+        }
     }
 
     /// Draws a batch of uniform transitions with replacement, and the noise of behaviour cloning.
@@ -141,12 +157,8 @@ impl<'d, T: Scalar> Learner<'d, T> {
                 let place = worker.first + sample;
                 let word = |stream| noise.words(stream, step, place as u32 / 4)[place % 4];
                 let row = below(word(stream::ROWS), rows) as usize;
-                source.fill(
-                    &mut worker.batch,
-                    sample,
-                    row,
-                    source.larger_budget(row, word(stream::BUDGET), word(stream::RELABEL)),
-                );
+                let extra = source.larger_budget(row, word(stream::BUDGET), word(stream::RELABEL));
+                source.fill(&mut worker.batch, sample, row, extra);
                 worker.batch.weight[sample] = T::of_f32(weights[row]);
                 worker.levels[sample] = 1 + below(word(stream::LEVELS), levels) as usize;
                 let mut column = worker.cloning.column_mut(sample);
@@ -183,8 +195,29 @@ impl<'d, T: Scalar> Learner<'d, T> {
         self.reweighting.weights()
     }
 
+    /// `lambda(kappa)` at budgets in units of recorded cost.
+    pub fn lambda<const N: usize>(&self, kappas: [f64; N]) -> [f64; N] {
+        let dual = &self.model.dual;
+        let scaled = kappas.map(|kappa| T::of(kappa * self.config.cost_scale));
+        let mut tape = dual.tape(N);
+        dual.forward(&self.state.parameters.dual, &scaled, &mut tape);
+        std::array::from_fn(|place| tape.lambda[place].to_f64())
+    }
+
+    /// Refreshes of the weights so far.
+    pub const fn refreshes(&self) -> u64 {
+        self.reweighting.refreshes(self.state.step)
+    }
+
     /// All that changes from step to step.
     pub const fn state(&self) -> &LearnerState<T> {
         &self.state
     }
+}
+
+/// The smallest and the largest of some values.
+fn range<T: Scalar>(values: impl Iterator<Item = T>) -> [f64; 2] {
+    values
+        .map(T::to_f64)
+        .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| [low.min(value), high.max(value)])
 }

@@ -26,6 +26,7 @@ pub mod model;
 pub mod nn;
 pub mod normaliser;
 pub mod pcgrad;
+pub mod report;
 pub mod reweight;
 pub mod run;
 mod source;

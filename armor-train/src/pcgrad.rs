@@ -5,12 +5,21 @@ use crate::nn::{Scalar, dot};
 /// Below this squared norm a gradient has no direction to project on.
 const NO_DIRECTION: f64 = 1e-12;
 
+/// What gradient surgery saw of the original gradients.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Surgery {
+    /// Pairs in conflict, 0 to 3 (Table A1).
+    pub conflicts: usize,
+    /// Euclidean norm of each task's gradient.
+    pub norms: [f64; 3],
+}
+
 /// Projects each task's gradient off the others that it conflicts with, and averages.
 ///
 /// For task `i`, in the order `orders[i]`, `g_i <- g_i - (g_i . g_j) / |g_j|^2 g_j`
 /// wherever `g_i . g_j < 0`; `g_j` is always the original gradient. The mean of
-/// the results is added to `out`. Returns the number of pairs in conflict, 0 to 3 (Table A1).
-pub fn project<T: Scalar>(gradients: &[Vec<T>; 3], orders: &[[usize; 2]; 3], out: &mut [T]) -> usize {
+/// the results is added to `out`.
+pub fn project<T: Scalar>(gradients: &[Vec<T>; 3], orders: &[[usize; 2]; 3], out: &mut [T]) -> Surgery {
     // All inner products of the originals; a projection changes them by these alone.
     let gram = gradients.each_ref().map(|a| gradients.each_ref().map(|b| dot(a, b)));
     let conflicts = [(0, 1), (0, 2), (1, 2)].into_iter().filter(|&(i, j)| gram[i][j] < 0.0).count();
@@ -34,7 +43,7 @@ pub fn project<T: Scalar>(gradients: &[Vec<T>; 3], orders: &[[usize; 2]; 3], out
     for (((out, &a), &b), &c) in out.iter_mut().zip(a).zip(b).zip(c) {
         *out += x * a + y * b + z * c;
     }
-    conflicts
+    Surgery { conflicts, norms: [gram[0][0], gram[1][1], gram[2][2]].map(f64::sqrt) }
 }
 
 /// The orders in which tasks meet the others, from three uniform words: each pair swapped or not.
@@ -87,7 +96,7 @@ mod tests {
     #[test]
     fn identical_gradients_are_unchanged() {
         let mut out = vec![0f64; 3];
-        assert_eq!(project(&[0; 3].map(|_| vec![1.0, -2.0, 3.0]), &ORDERS, &mut out), 0);
+        assert_eq!(project(&[0; 3].map(|_| vec![1.0, -2.0, 3.0]), &ORDERS, &mut out).conflicts, 0);
         for (out, expected) in out.iter().zip([1.0, -2.0, 3.0]) {
             assert!((out - expected).abs() < 1e-12);
         }
@@ -98,7 +107,7 @@ mod tests {
         // The third task is silent, so only the first two meet.
         let (a, b) = (vec![1.0, 0.0], vec![-1.0, 1.0]);
         let mut out = vec![0f64; 2];
-        assert_eq!(project(&[a.clone(), b.clone(), vec![0.0; 2]], &ORDERS, &mut out), 1);
+        assert_eq!(project(&[a.clone(), b.clone(), vec![0.0; 2]], &ORDERS, &mut out).conflicts, 1);
         // a off b is (0.5, 0.5), b off a is (0, 1).
         assert!((out[0] - 0.5 / 3.0).abs() < 1e-12);
         assert!((out[1] - 1.5 / 3.0).abs() < 1e-12);
@@ -107,7 +116,7 @@ mod tests {
     #[test]
     fn opposed_gradients_cancel() {
         let mut out = vec![0f64; 2];
-        assert_eq!(project(&[vec![1.0, 1.0], vec![-2.0, -2.0], vec![0.0; 2]], &ORDERS, &mut out), 1);
+        assert_eq!(project(&[vec![1.0, 1.0], vec![-2.0, -2.0], vec![0.0; 2]], &ORDERS, &mut out).conflicts, 1);
         assert!(out.iter().all(|value: &f64| value.abs() < 1e-12));
     }
 
@@ -116,6 +125,12 @@ mod tests {
         let third = |angle: f64| vec![angle.cos(), angle.sin()];
         let mut out = vec![0f64; 2];
         let spread = [0.0, 1.0, 2.0].map(|k| third(k * std::f64::consts::TAU / 3.0));
-        assert_eq!(project(&spread, &ORDERS, &mut out), 3);
+        assert_eq!(project(&spread, &ORDERS, &mut out).conflicts, 3);
+    }
+
+    #[test]
+    fn norms_are_those_of_the_originals() {
+        let gradients = [vec![3.0, 4.0], vec![-1.0, 0.0], vec![0.0, 0.0]];
+        assert_eq!(project(&gradients, &ORDERS, &mut [0f64; 2]).norms, [5.0, 1.0, 0.0]);
     }
 }

@@ -1,8 +1,48 @@
-//! What the unit tests share: repeatable numbers and finite differences.
+//! What the unit tests share: repeatable numbers, finite differences, a small recording, generated documents.
 
 use armor_core::noise::Noise;
 
 use crate::data::{Dataset, Recording};
+
+/// Trajectories of `steps` rows, with two state entries and one action entry;
+/// `reward` and `cost` are of a row.
+pub(crate) fn recording(
+    trajectories: usize,
+    steps: usize,
+    reward: impl Fn(usize) -> f32,
+    cost: impl Fn(usize) -> f32,
+) -> Dataset {
+    let rows = trajectories * steps;
+    let state = |row: usize| [(row as f32).sin(), (0.3 * row as f32).cos()];
+    Dataset::new(Recording {
+        state_dim: 2,
+        action_dim: 1,
+        observations: (0..rows).flat_map(state).collect(),
+        next_observations: (1..=rows).flat_map(state).collect(),
+        actions: (0..rows).map(|row| (0.7 * row as f32).sin()).collect(),
+        rewards: (0..rows).map(reward).collect(),
+        costs: (0..rows).map(cost).collect(),
+        terminals: vec![false; rows],
+        timeouts: (0..rows).map(|row| row % steps == steps - 1).collect(),
+        sha256: [5; 32],
+    })
+    .unwrap()
+}
+
+/// Compares a generated document with its file, `path` from the repository's
+/// root; with `RENEW_DOCS` set, writes it instead.
+#[track_caller]
+pub(crate) fn assert_document(path: &str, generated: &str) {
+    let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(path);
+    if std::env::var_os("RENEW_DOCS").is_some() {
+        return std::fs::write(file, generated).unwrap();
+    }
+    let written = std::fs::read_to_string(&file).unwrap_or_default();
+    assert!(
+        written == generated,
+        "{path} is out of date; renew it with: RENEW_DOCS=1 cargo test -p armor-train --lib document"
+    );
+}
 
 /// `len` repeatable standard normal draws, halved.
 pub(crate) fn fill(len: usize, stream: u32) -> Vec<f64> {

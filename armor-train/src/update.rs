@@ -14,7 +14,7 @@ use crate::batch::Batch;
 use crate::critic::{CriticTape, Task, bellman_target};
 use crate::model::{Model, Optimisers, Parameters};
 use crate::nn::{Scalar, accumulate, clip_norm, soft_update};
-use crate::pcgrad;
+use crate::pcgrad::{self, Surgery};
 
 /// A share of the batch, and room for everything that is computed from it.
 #[derive(Clone, Debug)]
@@ -47,8 +47,8 @@ pub struct Worker<T: Scalar> {
 pub struct CriticMetrics {
     /// Losses of reward, long-term and short-term cost, summed over the twins (Eq. 4).
     pub losses: [f64; 3],
-    /// Pairs of trunk gradients in conflict, 0 to 3 (Table A1).
-    pub conflicts: usize,
+    /// Conflicts and norms of the tasks' trunk gradients (Eq. 5, Table A1).
+    pub surgery: Surgery,
 }
 
 impl<T: Scalar> Worker<T> {
@@ -84,6 +84,11 @@ impl<T: Scalar> Worker<T> {
     /// `Q_cL - kappa` at those actions `[B]`.
     pub fn violation(&self) -> &[T] {
         &self.actor_tape.violation
+    }
+
+    /// The critic's pessimistic values of a task at those actions, for reward and long-term cost.
+    pub fn policy_values(&self, task: Task) -> impl Iterator<Item = T> {
+        self.actor_tape.values(task)
     }
 
     /// Eqs. 3 and 4: targets, losses and the gradient of each task.
@@ -158,7 +163,7 @@ pub fn update_critic<T: Scalar>(
             *sum += part / batch_len as f64;
         }
     }
-    metrics.conflicts = pcgrad::project(&trunk, orders, &mut gradient[..model.critic.trunk_size()]);
+    metrics.surgery = pcgrad::project(&trunk, orders, &mut gradient[..model.critic.trunk_size()]);
     clip_norm(&mut gradient, model.gradient_clip);
     optimisers.critic.descend(&mut parameters.critic, &gradient);
     (metrics, gradient)

@@ -146,7 +146,7 @@ impl Reference {
         let next = self.draws("next_start_noise", "next_step_noise");
         let (critic, gradient) = update_critic(&model, &mut parameters, &mut optimisers, &mut workers, &next, &ORDERS);
         self.expect("critic_losses", &critic.losses);
-        assert_eq!(critic.conflicts as f64, self.number("negative_pairs"));
+        assert_eq!(critic.surgery.conflicts as f64, self.number("negative_pairs"));
         self.expect("trunk_grad", &gradient[..model.critic.trunk_size()]);
         self.expect("critic_grad", &gradient);
         self.expect("critic_after", &parameters.critic);

@@ -37,10 +37,14 @@ impl<T: Scalar> Chain<T> {
     }
 
     /// Runs the chain in a prepared context; its end is [`Chain::action`].
+    ///
+    /// A sample whose estimate `x0` is clipped in every entry passes no gradient to
+    /// the network at that step: its part of the call is not kept.
     pub fn run(&mut self, denoiser: &Denoiser, parameters: &[T], context: &Context<T>, draw: &Draw<'_, T>) {
         let rows = self.action.nrows();
         let gradient = self.calls.len() == self.steps.len();
         let mut noise = vec![T::zero(); rows];
+        let mut kept = Vec::with_capacity(self.action.ncols());
         for (sample, mut column) in self.action.column_iter_mut().enumerate() {
             draw(0, sample, &mut noise);
             column.copy_from_slice(&noise);
@@ -66,6 +70,14 @@ impl<T: Scalar> Chain<T> {
                     }
                 }
             }
+            if gradient {
+                let inside = self.inside[slot].column_iter();
+                kept.clear();
+                kept.extend(
+                    inside.enumerate().filter(|(_, inside)| inside.iter().any(|x| !x.is_zero())).map(|(i, _)| i),
+                );
+                call.keep(&kept);
+            }
         }
     }
 
@@ -84,9 +96,14 @@ impl<T: Scalar> Chain<T> {
             let [from_action, from_noise, to_x0, to_action, _] = coefficients::<T>(step);
             // The gradient with respect to the estimate; a clipped entry passes none.
             let estimate = after.component_mul(inside) * to_x0;
-            call.noise_gradient().copy_from(&(&estimate * -from_noise));
+            let noise_gradient = estimate.select_columns(call.kept()) * -from_noise;
+            call.noise_gradient().columns_mut(0, noise_gradient.ncols()).copy_from(&noise_gradient);
             denoiser.backward(parameters, context, call, gradient);
-            after = after * to_action + estimate * from_action + &call.action_gradient;
+            after = after * to_action + estimate * from_action;
+            for (column, &sample) in call.kept().iter().enumerate() {
+                let mut sum = after.column_mut(sample);
+                sum += call.action_gradient.column(column);
+            }
         }
     }
 }

@@ -13,7 +13,9 @@ use std::ops::Range;
 
 use nalgebra::DMatrix;
 
-use crate::nn::{Activation, Linear, Mlp, Operand, Scalar, Tape, Update, product, sinusoidal_code};
+use crate::nn::{
+    Activation, Linear, Mlp, Operand, Scalar, Tape, Update, keep_columns, product, scale, sinusoidal_code,
+};
 
 /// Widths of the network.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -73,6 +75,8 @@ pub struct Call<T: Scalar> {
     pub levels: Vec<usize>,
     /// Gradient with respect to the noisy actions, `A x B`, after a backward pass.
     pub action_gradient: DMatrix<T>,
+    /// The samples that the leading columns belong to, ascending: all, or those kept for the backward pass.
+    kept: Vec<usize>,
     hidden: DMatrix<T>,
     hidden_slope: DMatrix<T>,
     hidden_gradient: DMatrix<T>,
@@ -88,6 +92,22 @@ impl<T: Scalar> Call<T> {
     /// Where the gradient with respect to the predicted noise is written.
     pub fn noise_gradient(&mut self) -> &mut DMatrix<T> {
         self.body.output_gradient()
+    }
+
+    /// Keeps these samples (ascending) for the backward pass, whose gradients then
+    /// stand in the leading columns; the noise gradient of the others is zero.
+    pub fn keep(&mut self, samples: &[usize]) {
+        keep_columns(&mut self.action, samples);
+        keep_columns(&mut self.hidden, samples);
+        keep_columns(&mut self.hidden_slope, samples);
+        self.body.keep(samples);
+        self.kept.clear();
+        self.kept.extend_from_slice(samples);
+    }
+
+    /// The samples of the backward pass, column by column.
+    pub fn kept(&self) -> &[usize] {
+        &self.kept
     }
 }
 
@@ -173,6 +193,7 @@ impl Denoiser {
         let hidden = || DMatrix::zeros(self.widths.hidden, samples);
         let action = || DMatrix::zeros(self.widths.action, samples);
         Call {
+            kept: Vec::with_capacity(samples),
             action: action(),
             levels: vec![1; samples],
             action_gradient: action(),
@@ -208,6 +229,8 @@ impl Denoiser {
     /// Predicts the noise in `call.action` at `call.levels`; with `slopes`, a backward pass may follow.
     pub fn forward<T: Scalar>(&self, parameters: &[T], context: &Context<T>, call: &mut Call<T>, slopes: bool) {
         let [of_action, ..] = self.blocks();
+        call.kept.clear();
+        call.kept.extend(0..call.action.ncols());
         call.hidden.copy_from(&context.constant);
         let hidden = call.hidden.as_mut_slice();
         product(hidden, self.first.block(parameters, of_action), (&call.action).into(), Update::Add);
@@ -231,16 +254,20 @@ impl Denoiser {
     ) {
         let hidden_gradient = &mut call.hidden_gradient;
         self.body.backward(parameters, &call.hidden, &mut call.body, Some(gradient), Some(hidden_gradient));
-        hidden_gradient.component_mul_assign(&call.hidden_slope);
+        let columns = call.kept.len();
+        scale(hidden_gradient, &call.hidden_slope, columns);
 
         let [of_action, ..] = self.blocks();
-        self.first.add_block_gradient(gradient, of_action.clone(), hidden_gradient, &call.action);
+        let (delta, action) = (Operand::leading(hidden_gradient, columns), Operand::leading(&call.action, columns));
+        self.first.add_block_gradient(gradient, of_action.clone(), delta, action);
         let weights = self.first.block(parameters, of_action).transposed();
-        product(call.action_gradient.as_mut_slice(), weights, (&*hidden_gradient).into(), Update::Replace);
-        context.constant_gradient += &*hidden_gradient;
-        for (column, &level) in hidden_gradient.column_iter().zip(&call.levels) {
-            let mut sum = context.table_gradient.column_mut(level - 1);
-            sum += column;
+        let action_gradient = &mut call.action_gradient.as_mut_slice()[..self.widths.action * columns];
+        product(action_gradient, weights, delta, Update::Replace);
+        for (column, &sample) in hidden_gradient.column_iter().zip(&call.kept) {
+            let mut constant_sum = context.constant_gradient.column_mut(sample);
+            constant_sum += &column;
+            let mut table_sum = context.table_gradient.column_mut(call.levels[sample] - 1);
+            table_sum += column;
         }
     }
 
@@ -254,10 +281,11 @@ impl Denoiser {
     ) {
         let [_, of_state, of_kappa, of_time] = self.blocks();
         let Context { kappa_input, kappa, time_code, time, constant_gradient, table_gradient, .. } = context;
-        self.first.add_block_gradient(gradient, of_state, constant_gradient, state);
-        self.first.add_block_gradient(gradient, of_kappa.clone(), constant_gradient, kappa.output());
-        self.first.add_bias_gradient(gradient, constant_gradient);
-        self.first.add_block_gradient(gradient, of_time.clone(), table_gradient, time.output());
+        let delta = Operand::from(&*constant_gradient);
+        self.first.add_block_gradient(gradient, of_state, delta, state.into());
+        self.first.add_block_gradient(gradient, of_kappa.clone(), delta, kappa.output().into());
+        self.first.add_bias_gradient(gradient, delta);
+        self.first.add_block_gradient(gradient, of_time.clone(), (&*table_gradient).into(), time.output().into());
 
         let back = |block, from: &DMatrix<T>, tape: &mut Tape<T>| {
             let weights = self.first.block(parameters, block).transposed();

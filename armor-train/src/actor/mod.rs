@@ -121,6 +121,13 @@ pub struct Judges<'a, T: Scalar> {
     pub dual: (&'a Dual, &'a [T]),
 }
 
+impl<T: Scalar> ActorTape<T> {
+    /// `Q_r` or `Q_cL` at the policy's actions.
+    pub(crate) fn values(&self, task: Task) -> impl Iterator<Item = T> {
+        self.critic.pessimistic(task)
+    }
+}
+
 impl Actor {
     /// Room for updates on `samples` columns.
     pub fn tape<T: Scalar>(&self, critic: &Critic, dual: &Dual, samples: usize) -> ActorTape<T> {

@@ -16,6 +16,10 @@ use crate::run::{self, Checkpoint, Outcome, RunError};
 ///
 /// The run's folder holds its configuration, its metrics and its last
 /// checkpoint. Ctrl-C saves and stops; the same command with --resume goes on.
+///
+/// `armor-train options` and docs/config.md say what can be --set,
+/// docs/metrics.md what the columns of metrics.csv are; `armor-train report`
+/// draws them.
 #[derive(Debug, clap::Args)]
 pub(super) struct Fit {
     /// An HDF5 file in the DSRL layout.
@@ -30,7 +34,7 @@ pub(super) struct Fit {
     /// What the options start from.
     #[arg(long, default_value = "quick")]
     preset: Preset,
-    /// Replace an option, as in --set eta=0.5; config.toml in a run's folder lists them.
+    /// Replace an option, as in --set eta=0.5; `armor-train options` lists them.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     set: Vec<String>,
     /// Training steps; the preset's, if not given.
@@ -104,6 +108,7 @@ pub(super) fn train(
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "trained {} steps in {:.0} s", self.steps, self.seconds)?;
-        write!(f, "run folder          {}", self.out.display())
+        writeln!(f, "run folder          {}", self.out.display())?;
+        write!(f, "curves              armor-train report {} -o report.html", self.out.display())
     }
 }

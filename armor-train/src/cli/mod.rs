@@ -4,8 +4,10 @@ mod data;
 mod evaluate;
 mod export;
 mod fit;
+mod options;
 mod progress;
 mod quickstart;
+mod report;
 mod run_folder;
 
 use std::fmt::Display;
@@ -32,8 +34,10 @@ enum Command {
     #[command(subcommand)]
     Data(data::Data),
     Fit(fit::Fit),
+    Options(options::Options),
     Export(export::Export),
     Evaluate(evaluate::Evaluate),
+    Report(report::Report),
 }
 
 /// Runs the command of the process's arguments.
@@ -44,8 +48,10 @@ pub fn main() -> ExitCode {
         Command::Quickstart(command) => command.run(output),
         Command::Data(command) => command.run(output),
         Command::Fit(command) => command.run(output),
+        Command::Options(command) => command.run(output),
         Command::Export(command) => command.run(output),
         Command::Evaluate(command) => command.run(output),
+        Command::Report(command) => command.run(output),
     })
 }
 

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use firmware_sim::cli::output::Output;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use crate::run::{Watch, Window};
+use crate::run::{Alarm, Watch, Window};
 
 /// Steps between plain lines where there is no terminal.
 const LINE_STEPS: u64 = 1_000;
@@ -55,6 +55,10 @@ impl Watch for Progress {
             self.bar.set_message(glance());
             self.bar.set_position(step);
         }
+    }
+
+    fn alarm(&mut self, alarm: &Alarm) {
+        self.bar.suspend(|| self.output.note(format_args!("{} ALARM {alarm}", self.label)));
     }
 
     fn wants_stop(&self) -> bool {

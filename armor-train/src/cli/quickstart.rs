@@ -43,10 +43,10 @@ pub(super) struct Quickstart {
     #[arg(long, default_value = RECORDING, hide_default_value = true)]
     data: PathBuf,
     /// Training seeds.
-    #[arg(long, value_delimiter = ',', default_values_t = [0, 1, 2])]
+    #[arg(long, value_delimiter = ',', default_values_t = [0, 1, 2], value_parser = clap::value_parser!(u64).range(..1 << 63))]
     seeds: Vec<u64>,
     /// Training steps for each seed; the preset's, if not given.
-    #[arg(long)]
+    #[arg(long, value_parser = clap::value_parser!(u64).range(1..))]
     steps: Option<u64>,
 }
 
@@ -208,6 +208,6 @@ impl fmt::Display for Report {
         writeln!(f, "files in {}", self.out.display())?;
         writeln!(f, "  seed-N/policy.armor         the image: firmware-sim inspect, verify, bench")?;
         writeln!(f, "  seed-N/chip.bin             the flashed chip: firmware-sim run --chip")?;
-        write!(f, "  seed-N/metrics.csv, config.toml, checkpoint.postcard    the training run")
+        write!(f, "  seed-N                      the training run: armor-train report")
     }
 }

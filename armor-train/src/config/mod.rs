@@ -2,6 +2,7 @@
 
 mod assign;
 mod check;
+pub mod options;
 mod preset;
 
 use armor_core::schedule::Sampler;

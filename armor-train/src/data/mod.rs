@@ -19,7 +19,9 @@ mod hdf5;
 mod key;
 mod moments;
 mod recording;
+mod sorted;
 mod stats;
+mod togo;
 
 pub use check::{Report, Warning, check};
 pub use dataset::{Dataset, Trajectory};
@@ -27,4 +29,6 @@ pub use error::{DataError, Fault};
 pub use key::Key;
 pub use moments::StateMoments;
 pub use recording::Recording;
+pub(crate) use sorted::Sorted;
 pub use stats::{Stats, feasible_mass};
+pub use togo::ToGo;

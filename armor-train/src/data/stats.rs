@@ -6,6 +6,7 @@ use armor_core::units::CostLimit;
 use serde::Serialize;
 
 use super::dataset::Dataset;
+use super::sorted::Sorted;
 
 /// Statistics of a data set at a cost limit.
 ///
@@ -93,24 +94,6 @@ pub fn feasible_mass(p: f64, beta: f64) -> f64 {
 
 fn share(part: usize, whole: usize) -> f64 {
     part as f64 / whole as f64
-}
-
-/// Returns in ascending order.
-struct Sorted(Vec<f64>);
-
-impl Sorted {
-    fn new(values: impl Iterator<Item = f64>) -> Self {
-        let mut values: Vec<f64> = values.collect();
-        values.sort_by(f64::total_cmp);
-        Self(values)
-    }
-
-    /// The value at `q * (n - 1)`, interpolated.
-    fn quantile(&self, q: f64) -> f64 {
-        let at = q * (self.0.len() - 1) as f64;
-        let (below, above) = (self.0[at.floor() as usize], self.0[at.ceil() as usize]);
-        below + (above - below) * at.fract()
-    }
 }
 
 impl fmt::Display for Stats {

@@ -2,8 +2,6 @@
 
 use std::ops::Range;
 
-use nalgebra::DMatrix;
-
 use super::Scalar;
 use super::product::{Operand, Update, product};
 
@@ -56,7 +54,7 @@ impl Linear {
     }
 
     /// Adds the gradient of weights and bias: `delta x^T` and the row sums of `delta`.
-    pub fn add_gradient<T: Scalar>(&self, gradient: &mut [T], delta: &DMatrix<T>, input: &DMatrix<T>) {
+    pub fn add_gradient<T: Scalar>(&self, gradient: &mut [T], delta: Operand<'_, T>, input: Operand<'_, T>) {
         self.add_block_gradient(gradient, 0..self.inputs, delta, input);
         self.add_bias_gradient(gradient, delta);
     }
@@ -66,17 +64,17 @@ impl Linear {
         &self,
         gradient: &mut [T],
         inputs: Range<usize>,
-        delta: &DMatrix<T>,
-        input: &DMatrix<T>,
+        delta: Operand<'_, T>,
+        input: Operand<'_, T>,
     ) {
         let block = &mut gradient[self.range(inputs)];
-        product(block, delta.into(), Operand::from(input).transposed(), Update::Add);
+        product(block, delta, input.transposed(), Update::Add);
     }
 
     /// Adds the gradient of the bias: the row sums of `delta`.
-    pub fn add_bias_gradient<T: Scalar>(&self, gradient: &mut [T], delta: &DMatrix<T>) {
+    pub fn add_bias_gradient<T: Scalar>(&self, gradient: &mut [T], delta: Operand<'_, T>) {
         let bias = self.bias_mut(gradient);
-        for column in delta.as_slice().chunks_exact(bias.len()) {
+        for column in delta.columns() {
             for (sum, &delta) in bias.iter_mut().zip(column) {
                 *sum += delta;
             }

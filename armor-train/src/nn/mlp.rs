@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::product::{Update, product};
+use super::product::{Operand, Update, product};
 use super::{Activation, Linear, Scalar};
 
 /// Layout of a stack of layers within a parameter vector.
@@ -23,6 +23,8 @@ pub struct Tape<T: Scalar> {
     slopes: Vec<DMatrix<T>>,
     /// Gradient with respect to each layer's sum.
     deltas: Vec<DMatrix<T>>,
+    /// Columns of the above that hold samples.
+    columns: usize,
 }
 
 impl<T: Scalar> Tape<T> {
@@ -34,6 +36,12 @@ impl<T: Scalar> Tape<T> {
     /// Where the gradient with respect to the output is written before a backward pass.
     pub fn output_gradient(&mut self) -> &mut DMatrix<T> {
         self.deltas.last_mut().expect("an Mlp has a layer")
+    }
+
+    /// Keeps these samples (ascending) for the backward pass, in the leading columns, and forgets the others.
+    pub fn keep(&mut self, samples: &[usize]) {
+        self.values.iter_mut().chain(&mut self.slopes).for_each(|matrix| keep_columns(matrix, samples));
+        self.columns = samples.len();
     }
 }
 
@@ -61,7 +69,7 @@ impl Mlp {
     /// Room for passes over `samples` columns.
     pub fn tape<T: Scalar>(&self, samples: usize) -> Tape<T> {
         let room = || self.layers.iter().map(|layer| DMatrix::zeros(layer.outputs, samples)).collect();
-        Tape { values: room(), slopes: room(), deltas: room() }
+        Tape { values: room(), slopes: room(), deltas: room(), columns: samples }
     }
 
     fn is_activated(&self, layer: usize) -> bool {
@@ -70,6 +78,7 @@ impl Mlp {
 
     /// Runs the stack on `input`, `inputs x samples`; with `slopes`, a backward pass may follow.
     pub fn forward<T: Scalar>(&self, parameters: &[T], input: &DMatrix<T>, tape: &mut Tape<T>, slopes: bool) {
+        tape.columns = input.ncols();
         for (index, layer) in self.layers.iter().enumerate() {
             let (before, rest) = tape.values.split_at_mut(index);
             let input = before.last().unwrap_or(input);
@@ -88,6 +97,7 @@ impl Mlp {
     ///
     /// Adds to `gradient` (as long as the parameters) where it is given, and
     /// writes the gradient with respect to the input where `input_gradient` is given.
+    /// After [`Tape::keep`] this holds for the leading columns of input and gradients alone.
     pub fn backward<T: Scalar>(
         &self,
         parameters: &[T],
@@ -96,23 +106,26 @@ impl Mlp {
         mut gradient: Option<&mut [T]>,
         input_gradient: Option<&mut DMatrix<T>>,
     ) {
+        let columns = tape.columns;
         for (index, layer) in self.layers.iter().enumerate().rev() {
             if self.is_activated(index) {
-                tape.deltas[index].component_mul_assign(&tape.slopes[index]);
+                scale(&mut tape.deltas[index], &tape.slopes[index], columns);
             }
             let (before, rest) = tape.deltas.split_at_mut(index);
-            let delta = &rest[0];
+            let delta = Operand::leading(&rest[0], columns);
             if let Some(gradient) = gradient.as_deref_mut() {
                 let input = if index == 0 { input } else { &tape.values[index - 1] };
-                layer.add_gradient(gradient, delta, input);
+                layer.add_gradient(gradient, delta, Operand::leading(input, columns));
             }
             if let Some(below) = before.last_mut() {
-                product(below.as_mut_slice(), layer.weights(parameters).transposed(), delta.into(), Update::Replace);
+                let below = &mut below.as_mut_slice()[..layer.inputs * columns];
+                product(below, layer.weights(parameters).transposed(), delta, Update::Replace);
             }
         }
         if let (Some(input_gradient), Some(first)) = (input_gradient, self.layers.first()) {
             let weights = first.weights(parameters).transposed();
-            product(input_gradient.as_mut_slice(), weights, (&tape.deltas[0]).into(), Update::Replace);
+            let input_gradient = &mut input_gradient.as_mut_slice()[..first.inputs * columns];
+            product(input_gradient, weights, Operand::leading(&tape.deltas[0], columns), Update::Replace);
         }
     }
 
@@ -131,6 +144,22 @@ impl Linear {
         for (parameter, draw) in parameters[self.offset..self.end()].iter_mut().zip(draws) {
             *parameter = T::of(bound * (2.0 * draw - 1.0));
         }
+    }
+}
+
+/// Moves the given columns (ascending) to the front.
+pub fn keep_columns<T: Scalar>(matrix: &mut DMatrix<T>, columns: &[usize]) {
+    let rows = matrix.nrows();
+    for (to, &from) in columns.iter().enumerate().filter(|&(to, &from)| to != from) {
+        matrix.as_mut_slice().copy_within(from * rows..(from + 1) * rows, to * rows);
+    }
+}
+
+/// Multiplies the first `columns` columns by `slopes`, entry by entry.
+pub fn scale<T: Scalar>(delta: &mut DMatrix<T>, slopes: &DMatrix<T>, columns: usize) {
+    let len = delta.nrows() * columns;
+    for (delta, &slope) in delta.as_mut_slice()[..len].iter_mut().zip(slopes.as_slice()) {
+        *delta *= slope;
     }
 }
 

@@ -18,7 +18,7 @@ mod sinusoid;
 pub use activation::Activation;
 pub use adam::Adam;
 pub use linear::Linear;
-pub use mlp::{Mlp, Tape};
+pub use mlp::{Mlp, Tape, keep_columns, scale};
 pub use product::{Operand, Update, product};
 pub use scalar::Scalar;
 pub use sinusoid::sinusoidal_code;

@@ -28,6 +28,19 @@ impl<'a, T> Operand<'a, T> {
         Self { values, rows, columns, row_stride: 1, column_stride: rows }
     }
 
+    /// The first columns of a matrix.
+    ///
+    /// # Panics
+    /// Unless there are so many.
+    pub fn leading(matrix: &'a DMatrix<T>, columns: usize) -> Self {
+        Self::new(&matrix.as_slice()[..matrix.nrows() * columns], matrix.nrows(), columns)
+    }
+
+    /// The columns of a matrix that is not transposed.
+    pub(super) fn columns(self) -> std::slice::ChunksExact<'a, T> {
+        self.values.chunks_exact(self.rows)
+    }
+
     /// The transpose, without moving a number.
     pub fn transposed(self) -> Self {
         Self {

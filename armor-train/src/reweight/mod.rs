@@ -4,11 +4,13 @@
 pub mod counterfactual;
 pub mod reference;
 mod refresh;
+mod summary;
 pub mod trajectory;
 
 use crate::data::Dataset;
 
 pub use refresh::Reweighting;
+pub use summary::WeightSummary;
 
 /// Guards the division by a mean of zero (Eqs. 9 and 10).
 pub const EPSILON: f64 = 1e-6;
@@ -26,6 +28,11 @@ impl Refresh {
     /// Whether the weights are refreshed before training step `step`, counted from 0.
     pub const fn is_due(&self, step: u64) -> bool {
         step >= self.warmup && (step - self.warmup).is_multiple_of(self.interval)
+    }
+
+    /// Refreshes before `steps` training steps were done.
+    pub const fn done(&self, steps: u64) -> u64 {
+        if steps > self.warmup { (steps - self.warmup - 1) / self.interval + 1 } else { 0 }
     }
 }
 
@@ -68,6 +75,16 @@ mod tests {
         let refresh = Refresh { warmup: 20_000, interval: 5_000 };
         let due: Vec<u64> = (0..200_000).filter(|&step| refresh.is_due(step)).collect();
         assert_eq!((due.len(), due[0], due[35]), (36, 20_000, 195_000));
+    }
+
+    #[test]
+    fn refreshes_done_are_those_that_were_due() {
+        for (warmup, interval) in [(0, 1), (0, 3), (7, 5), (4, 1)] {
+            let refresh = Refresh { warmup, interval };
+            for steps in 0..30 {
+                assert_eq!(refresh.done(steps), (0..steps).filter(|&step| refresh.is_due(step)).count() as u64);
+            }
+        }
     }
 
     #[test]

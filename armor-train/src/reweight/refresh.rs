@@ -62,6 +62,11 @@ impl Reweighting {
         self.refresh.is_due(step)
     }
 
+    /// Refreshes before `steps` training steps were done.
+    pub const fn refreshes(&self, steps: u64) -> u64 {
+        self.refresh.done(steps)
+    }
+
     /// The weights of all transitions.
     pub const fn weights(&self) -> &Weights {
         &self.weights

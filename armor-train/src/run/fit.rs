@@ -4,21 +4,23 @@ use std::path::Path;
 
 use firmware_sim::file;
 
-use super::metrics::Table;
-use super::{Checkpoint, RunError, Window, check_sizes};
+use super::record::Record;
+use super::{Alarm, Checkpoint, Provenance, RunError, Window, check_sizes};
 use crate::config::Config;
 use crate::data::Dataset;
 use crate::learner::Learner;
 
 /// Steps between checkpoints, a multiple of the steps of a metrics row.
 const CHECKPOINT_STEPS: u64 = 1_000;
-const CONFIG_FILE: &str = "config.toml";
-const METRICS_FILE: &str = "metrics.csv";
+/// The effective configuration.
+pub const CONFIG_FILE: &str = "config.toml";
 
 /// Who looks on while a run trains.
 pub trait Watch {
     /// Called after every step, with the steps done and the metrics since the last row.
     fn step(&mut self, step: u64, window: &Window);
+    /// Called once for each cause of alarm.
+    fn alarm(&mut self, _alarm: &Alarm) {}
     /// Whether the run shall save and stop.
     fn wants_stop(&self) -> bool;
 }
@@ -46,20 +48,22 @@ pub fn fit(
 ) -> Result<Outcome, RunError> {
     config.check()?;
     check_sizes(config, data)?;
-    let (mut learner, mut window, mut table) = start(config, data, folder, resume)?;
+    let (mut learner, mut window, mut record) = start(config, data, folder, resume)?;
     while learner.state().step < config.steps {
         window.push(&learner.step());
         let step = learner.state().step;
         watch.step(step, &window);
-        if !window.is_finite() {
-            return Err(RunError::Diverged { step });
+        if let Some(column) = window.not_finite() {
+            record.not_finite(step, column, watch);
+            record.write(folder)?;
+            return Err(RunError::Diverged { step, column });
         }
         if window.is_full() {
-            table.push(&window.take_row(step, counterfactual_active(&learner)));
+            record.row(&learner, &mut window, watch);
+            record.write(folder)?;
         }
         let stop = watch.wants_stop();
         if stop || step.is_multiple_of(CHECKPOINT_STEPS) || step == config.steps {
-            file::write(&folder.join(METRICS_FILE), table.text().as_bytes())?;
             save(&learner, data, &window, folder)?;
         }
         if stop && step < config.steps {
@@ -74,7 +78,8 @@ fn start<'d>(
     data: &'d Dataset,
     folder: &Path,
     resume: bool,
-) -> Result<(Learner<'d, f32>, Window, Table), RunError> {
+) -> Result<(Learner<'d, f32>, Window, Record), RunError> {
+    let provenance = Provenance::new(config, data);
     let exists = folder.join(Checkpoint::FILE).exists();
     match (resume, exists) {
         (false, true) => Err(RunError::Taken { folder: folder.into() }),
@@ -82,19 +87,22 @@ fn start<'d>(
         (true, true) => {
             let checkpoint = Checkpoint::read(folder)?;
             same_run(&checkpoint, config, data, folder)?;
-            let text = file::read(&folder.join(METRICS_FILE))?;
-            let table = Table::until(&String::from_utf8_lossy(&text), checkpoint.state.step);
+            let learner = Learner::resume(config.clone(), data, checkpoint.state);
+            let mut record = Record::new(config, data, &provenance, &learner);
+            record.take_up(folder)?;
             write_config(config, folder)?;
-            Ok((Learner::resume(config.clone(), data, checkpoint.state), checkpoint.window, table))
+            provenance.write(folder)?;
+            Ok((learner, checkpoint.window, record))
         }
         (false, false) => {
             std::fs::create_dir_all(folder).map_err(|source| RunError::Folder { folder: folder.into(), source })?;
             write_config(config, folder)?;
             let learner = Learner::new(config.clone(), data);
-            let (window, table) = (Window::default(), Table::new());
-            file::write(&folder.join(METRICS_FILE), table.text().as_bytes())?;
+            let (window, record) = (Window::default(), Record::new(config, data, &provenance, &learner));
+            provenance.write(folder)?;
+            record.write(folder)?;
             save(&learner, data, &window, folder)?;
-            Ok((learner, window, table))
+            Ok((learner, window, record))
         }
     }
 }
@@ -136,8 +144,6 @@ fn save(learner: &Learner<'_, f32>, data: &Dataset, window: &Window, folder: &Pa
     checkpoint.write(folder)
 }
 
-/// Share of transitions whose counterfactual weight is above 1.
-fn counterfactual_active(learner: &Learner<'_, f32>) -> f64 {
-    let weights = &learner.weights().counterfactual;
-    weights.iter().filter(|&&weight| weight > 1.0).count() as f64 / weights.len() as f64
-}
+#[cfg(test)]
+#[path = "fit_tests.rs"]
+mod tests;

@@ -1,54 +1,84 @@
 //! What a run measures while it learns.
 
-use std::fmt::Write;
-
 use serde::{Deserialize, Serialize};
 
+use super::columns::COLUMNS;
 use crate::learner::Metrics;
+use crate::reweight::WeightSummary;
 
 /// Steps between rows of `metrics.csv`.
 pub(super) const ROW_STEPS: u64 = 100;
 
-/// Columns of `metrics.csv`, and what they mean. All but the first are means over the last 100 steps.
-pub const COLUMNS: [(&str, &str); 14] = [
-    ("step", "training steps done"),
-    ("critic_loss_reward", "loss of the reward heads, summed over the twins (Eq. 4)"),
-    ("critic_loss_long_cost", "loss of the long-term cost heads (Eq. 4)"),
-    ("critic_loss_short_cost", "loss of the short-term cost heads (Eq. 4)"),
-    ("conflicts_0", "share of steps without a pair of trunk gradients in conflict (Table A1)"),
-    ("conflicts_1", "share of steps with one pair in conflict"),
-    ("conflicts_2", "share of steps with two pairs in conflict"),
-    ("conflicts_3", "share of steps with three pairs in conflict"),
-    ("cloning_loss", "weighted behaviour cloning (Eq. 13)"),
-    ("q_reward", "Q_r at the policy's actions"),
-    ("q_long_cost", "Q_cL at the policy's actions"),
-    ("lambda", "dual variable at the budgets of the batch"),
-    ("penalty", "lambda (Q_cL - kappa) (Eq. 15)"),
-    ("counterfactual_active", "share of transitions with a counterfactual weight above 1, at the last step"),
-];
+/// One row of `metrics.csv`; [`COLUMNS`] says what each number is.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Row {
+    pub(super) step: u64,
+    pub(super) critic_loss: [f64; 3],
+    pub(super) conflicts: [f64; 4],
+    pub(super) cloning: f64,
+    /// Smallest, mean, largest.
+    pub(super) q_reward: [f64; 3],
+    /// Smallest, mean, largest.
+    pub(super) q_long_cost: [f64; 3],
+    pub(super) lambda: f64,
+    pub(super) penalty: f64,
+    pub(super) lambda_by_kappa: [f64; 4],
+    pub(super) trunk_norms: [f64; 3],
+    pub(super) gradient_norms: [f64; 3],
+    pub(super) weights: WeightSummary,
+}
 
-/// Sums since the last row.
+/// What is measured at a row's last step alone.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Snapshot {
+    /// `lambda(kappa)` at 0, half the limit, the limit, and the data's largest kappa.
+    pub(super) lambda_by_kappa: [f64; 4],
+    /// The weights of all transitions.
+    pub(super) weights: WeightSummary,
+}
+
+impl Row {
+    /// The numbers in the order of [`COLUMNS`].
+    pub(super) fn values(&self) -> Vec<f64> {
+        COLUMNS.iter().map(|column| (column.value)(self)).collect()
+    }
+}
+
+/// What was measured since the last row.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Window {
     steps: u64,
-    sums: [f64; 8],
+    /// Sums of the losses, and of the actor's cloning, `Q_r`, `Q_cL`, lambda, penalty.
+    critic_loss: [f64; 3],
+    actor: [f64; 5],
+    trunk_norms: [f64; 3],
+    gradient_norms: [f64; 3],
     conflicts: [u64; 4],
+    reward_range: [f64; 2],
+    long_cost_range: [f64; 2],
 }
 
 impl Window {
     /// Adds one step.
     pub fn push(&mut self, metrics: &Metrics) {
-        let Metrics { critic, actor } = metrics;
-        let [reward, long, short] = critic.losses;
-        let values = [reward, long, short, actor.cloning, actor.reward, actor.long_cost, actor.lambda, actor.penalty];
-        self.sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += value);
-        self.conflicts[critic.conflicts] += 1;
+        let Metrics { critic, actor, reward_range, long_cost_range, gradient_norms } = metrics;
+        add(&mut self.critic_loss, critic.losses);
+        add(&mut self.actor, [actor.cloning, actor.reward, actor.long_cost, actor.lambda, actor.penalty]);
+        add(&mut self.trunk_norms, critic.surgery.norms);
+        add(&mut self.gradient_norms, *gradient_norms);
+        self.conflicts[critic.surgery.conflicts] += 1;
+        for (range, &[low, high]) in
+            [(&mut self.reward_range, reward_range), (&mut self.long_cost_range, long_cost_range)]
+        {
+            *range = if self.steps == 0 { [low, high] } else { [range[0].min(low), range[1].max(high)] };
+        }
         self.steps += 1;
     }
 
-    /// Whether every loss so far was a finite number.
-    pub fn is_finite(&self) -> bool {
-        self.sums.iter().all(|sum| sum.is_finite())
+    /// Name of the first column that is no finite number, if there is one.
+    pub fn not_finite(&self) -> Option<&'static str> {
+        let row = self.row(0, &Snapshot::default());
+        COLUMNS.iter().find(|column| !(column.value)(&row).is_finite()).map(|column| column.name)
     }
 
     /// Whether a row is due.
@@ -56,94 +86,122 @@ impl Window {
         self.steps >= ROW_STEPS
     }
 
-    /// The row in the order of [`COLUMNS`], and an empty window.
-    pub fn take_row(&mut self, step: u64, counterfactual_active: f64) -> String {
-        let window = std::mem::take(self);
-        let steps = window.steps as f64;
-        let [reward, long, short, rest @ ..] = window.sums.map(|sum| sum / steps);
-        let conflicts = window.conflicts.map(|count| count as f64 / steps);
-        let mut row = step.to_string();
-        for value in [reward, long, short].into_iter().chain(conflicts).chain(rest).chain([counterfactual_active]) {
-            // Writing to a string cannot fail.
-            let _ = write!(row, ",{value}");
+    /// The row up to `step`; the window is empty then.
+    pub(super) fn take_row(&mut self, step: u64, snapshot: &Snapshot) -> Row {
+        std::mem::take(self).row(step, snapshot)
+    }
+
+    fn row(&self, step: u64, snapshot: &Snapshot) -> Row {
+        let steps = self.steps.max(1) as f64;
+        let mean = |sum: f64| sum / steps;
+        let [cloning, reward, long_cost, lambda, penalty] = self.actor.map(mean);
+        Row {
+            step,
+            critic_loss: self.critic_loss.map(mean),
+            conflicts: self.conflicts.map(|count| count as f64 / steps),
+            cloning,
+            q_reward: [self.reward_range[0], reward, self.reward_range[1]],
+            q_long_cost: [self.long_cost_range[0], long_cost, self.long_cost_range[1]],
+            lambda,
+            penalty,
+            lambda_by_kappa: snapshot.lambda_by_kappa,
+            trunk_norms: self.trunk_norms.map(mean),
+            gradient_norms: self.gradient_norms.map(mean),
+            weights: snapshot.weights,
         }
-        row
     }
 
     /// Mean cloning loss, mean `Q_r`, mean `Q_cL` and mean lambda since the last row.
     pub fn glance(&self) -> [f64; 4] {
-        let [_, _, _, cloning, reward, long_cost, lambda, _] = self.sums;
+        let [cloning, reward, long_cost, lambda, _] = self.actor;
         [cloning, reward, long_cost, lambda].map(|sum| sum / self.steps.max(1) as f64)
     }
 }
 
-/// `metrics.csv`, held in memory and written whole.
-#[derive(Clone, Debug)]
-pub(super) struct Table {
-    text: String,
-}
-
-impl Table {
-    pub(super) fn new() -> Self {
-        let names: Vec<&str> = COLUMNS.iter().map(|(name, _)| *name).collect();
-        Self { text: names.join(",") + "\n" }
-    }
-
-    /// The rows of an earlier table up to `step`: what came after belongs to work that was lost.
-    pub(super) fn until(text: &str, step: u64) -> Self {
-        let mut table = Self::new();
-        let step_of = |row: &str| row.split(',').next().and_then(|step| step.parse::<u64>().ok());
-        text.lines().filter(|row| step_of(row).is_some_and(|at| at <= step)).for_each(|row| table.push(row));
-        table
-    }
-
-    pub(super) fn push(&mut self, row: &str) {
-        self.text.push_str(row);
-        self.text.push('\n');
-    }
-
-    pub(super) fn text(&self) -> &str {
-        &self.text
-    }
+fn add<const N: usize>(sums: &mut [f64; N], values: [f64; N]) {
+    sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += value);
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::actor::ActorLoss;
+    use crate::pcgrad::Surgery;
+    use crate::run::columns::value;
     use crate::update::CriticMetrics;
 
     fn metrics(cloning: f64, conflicts: usize) -> Metrics {
-        let critic = CriticMetrics { losses: [1.0, 2.0, 3.0], conflicts };
-        Metrics { critic, actor: ActorLoss { cloning, reward: 5.0, long_cost: 6.0, penalty: 8.0, lambda: 7.0 } }
+        let surgery = Surgery { conflicts, norms: [10.0, 11.0, 12.0] };
+        Metrics {
+            critic: CriticMetrics { losses: [1.0, 2.0, 3.0], surgery },
+            actor: ActorLoss { cloning, reward: 5.0, long_cost: 6.0, penalty: 8.0, lambda: 7.0 },
+            reward_range: [5.0 - cloning, 5.0 + cloning],
+            long_cost_range: [6.0, 6.5],
+            gradient_norms: [13.0, 14.0, 15.0],
+        }
     }
 
     #[test]
-    fn a_row_holds_the_means_in_the_order_of_the_columns() {
+    fn a_row_holds_means_and_extremes_under_their_names() {
         let mut window = Window::default();
         window.push(&metrics(3.0, 0));
         window.push(&metrics(5.0, 2));
-        let row = window.take_row(200, 0.25);
-        assert_eq!(row, "200,1,2,3,0.5,0,0.5,0,4,5,6,7,8,0.25");
-        assert_eq!(row.split(',').count(), COLUMNS.len());
+        let weights = WeightSummary { active: 0.25, quantiles: [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7] };
+        let snapshot = Snapshot { lambda_by_kappa: [1.5, 2.5, 3.5, 4.5], weights };
+        let row = window.take_row(200, &snapshot).values();
+        assert_eq!(row.len(), COLUMNS.len());
         assert_eq!(window, Window::default());
+        for (name, expected) in [
+            ("step", 200.0),
+            ("critic_loss_reward", 1.0),
+            ("critic_loss_long_cost", 2.0),
+            ("critic_loss_short_cost", 3.0),
+            ("conflicts_0", 0.5),
+            ("conflicts_1", 0.0),
+            ("conflicts_2", 0.5),
+            ("conflicts_3", 0.0),
+            ("cloning_loss", 4.0),
+            ("q_reward_min", 0.0),
+            ("q_reward", 5.0),
+            ("q_reward_max", 10.0),
+            ("q_long_cost_min", 6.0),
+            ("q_long_cost", 6.0),
+            ("q_long_cost_max", 6.5),
+            ("lambda", 7.0),
+            ("penalty", 8.0),
+            ("lambda_kappa_0", 1.5),
+            ("lambda_kappa_half", 2.5),
+            ("lambda_kappa_limit", 3.5),
+            ("lambda_kappa_max", 4.5),
+            ("gradient_trunk_reward", 10.0),
+            ("gradient_trunk_long_cost", 11.0),
+            ("gradient_trunk_short_cost", 12.0),
+            ("gradient_critic", 13.0),
+            ("gradient_actor", 14.0),
+            ("gradient_dual", 15.0),
+            ("counterfactual_active", 0.25),
+            ("weight_min", 0.1),
+            ("weight_p10", 0.2),
+            ("weight_p50", 0.3),
+            ("weight_p90", 0.4),
+            ("weight_p95", 0.5),
+            ("weight_p99", 0.6),
+            ("weight_max", 0.7),
+        ] {
+            assert_eq!(value(&row, name), expected, "{name}");
+        }
     }
 
     #[test]
-    fn a_loss_that_is_no_number_is_noticed() {
+    fn the_first_number_that_is_not_finite_is_named() {
         let mut window = Window::default();
         window.push(&metrics(1.0, 0));
-        assert!(window.is_finite());
+        assert_eq!(window.not_finite(), None);
+        let mut broken = metrics(1.0, 0);
+        broken.gradient_norms[1] = f64::INFINITY;
+        window.push(&broken);
+        assert_eq!(window.not_finite(), Some("gradient_actor"));
         window.push(&metrics(f64::NAN, 0));
-        assert!(!window.is_finite());
-    }
-
-    #[test]
-    fn rows_beyond_the_checkpoint_are_dropped() {
-        let mut table = Table::new();
-        ["100,1", "200,2", "300,3"].into_iter().for_each(|row| table.push(row));
-        let kept = Table::until(table.text(), 200);
-        assert!(kept.text().ends_with("100,1\n200,2\n"));
-        assert!(kept.text().starts_with("step,critic_loss_reward"));
+        assert_eq!(window.not_finite(), Some("cloning_loss"));
     }
 }

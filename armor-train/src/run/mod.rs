@@ -2,7 +2,10 @@
 //!
 //! ```text
 //! DIR/config.toml           the effective configuration
+//! DIR/provenance.json       version, data, and what the data's values span
 //! DIR/metrics.csv           one row every 100 steps
+//! DIR/speed.csv             steps per second, the only file that differs from run to run
+//! DIR/alarms.log            what went wrong, and what to try
 //! DIR/checkpoint.postcard   all that changes from step to step
 //! ```
 //!
@@ -10,9 +13,14 @@
 //! at any moment the folder holds the last whole checkpoint, and a resumed run
 //! has the bits of one never stopped.
 
+mod alarm;
 mod checkpoint;
+mod columns;
 mod fit;
 mod metrics;
+mod provenance;
+mod record;
+mod table;
 
 use std::path::PathBuf;
 
@@ -23,9 +31,14 @@ use firmware_sim::task::Task;
 use crate::config::{Config, ConfigError};
 use crate::data::{DataError, Dataset};
 
+pub use alarm::{Alarm, Cause};
 pub use checkpoint::Checkpoint;
-pub use fit::{Outcome, Watch, fit};
-pub use metrics::{COLUMNS, Window};
+pub use columns::{COLUMNS, Column, SPEED_COLUMNS};
+pub use fit::{CONFIG_FILE, Outcome, Watch, fit};
+pub use metrics::{Row, Window};
+pub use provenance::Provenance;
+pub use record::{ALARMS_FILE, METRICS_FILE, SPEED_FILE};
+pub use table::Table;
 
 /// Why a run cannot start, go on, or be read.
 #[derive(Debug, thiserror::Error)]
@@ -119,13 +132,29 @@ pub enum RunError {
         /// The folder.
         folder: PathBuf,
     },
+    /// A table has other columns than this version writes.
+    #[error("{} has other columns than this version writes; restore it, or start the run anew", path.display())]
+    Columns {
+        /// The table.
+        path: PathBuf,
+    },
+    /// A line of a table is no row of numbers.
+    #[error("line {line} of {} is no row of numbers; restore the file, or start the run anew", path.display())]
+    Row {
+        /// The table.
+        path: PathBuf,
+        /// The line, counted from 1.
+        line: usize,
+    },
     /// A loss is no longer a number.
     #[error(
-        "training diverged at step {step}: a loss is not finite; the last checkpoint is kept (try a smaller critic_rate)"
+        "training diverged at step {step}: a loss is not finite ({column}); the last checkpoint is kept, alarms.log says what to try"
     )]
     Diverged {
         /// The step.
         step: u64,
+        /// Column of `metrics.csv` that noticed it.
+        column: &'static str,
     },
 }
 

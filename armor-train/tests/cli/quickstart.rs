@@ -2,7 +2,16 @@
 
 use super::*;
 
-const FILES: [&str; 5] = ["checkpoint.postcard", "chip.bin", "config.toml", "metrics.csv", "policy.armor"];
+const FILES: [&str; 8] = [
+    "alarms.log",
+    "checkpoint.postcard",
+    "chip.bin",
+    "config.toml",
+    "metrics.csv",
+    "policy.armor",
+    "provenance.json",
+    "speed.csv",
+];
 
 #[test]
 fn it_makes_every_promised_figure_and_file_and_goes_on_where_it_was() {

@@ -61,7 +61,8 @@ fn a_run_is_trained_exported_and_scored() {
     let report = bench.json(&ball_run("run", 5));
     assert_eq!((&report["out"], &report["steps"]), (&"run".into(), &5.into()));
     assert!(report["seconds"].is_number());
-    assert_eq!(bench.names("run"), ["checkpoint.postcard", "config.toml", "metrics.csv"]);
+    let files = ["alarms.log", "checkpoint.postcard", "config.toml", "metrics.csv", "provenance.json", "speed.csv"];
+    assert_eq!(bench.names("run"), files);
     let config = text(&bench.bytes("run/config.toml"));
     for line in ["preset = \"paper\"", "hidden = 8", "limit = 5.0", "steps = 5", "seed = 0"] {
         assert!(config.lines().any(|other| other == line), "{line} in {config}");

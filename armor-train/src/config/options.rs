@@ -1,0 +1,246 @@
+//! What every option means: the source of `docs/config.md` and `armor-train options`.
+
+use std::fmt::Write;
+
+use super::Preset;
+
+/// An option of [`Config`](super::Config): its key, and its meaning with equation or reason.
+pub type Entry = (&'static str, &'static str);
+
+/// All options, by what they are about. `O-n` are the choices that the paper
+/// leaves open; the meaning says what was chosen and why.
+pub const OPTIONS: [(&str, &[Entry]); 5] = [
+    (
+        "Run",
+        &[
+            ("preset", "named set of choices that the other keys started from: `paper` or `quick`"),
+            ("data", "path of the recorded data; given by --data"),
+            ("task", "task that was recorded, such as ball-run; given by --task"),
+            ("limit", "cost limit d of an episode, in units of recorded cost (Eq. 1); given by --limit"),
+            ("seed", "seed of everything random; given by --seed"),
+            ("steps", "training steps (Table 2); given by --steps"),
+            ("batch", "transitions of a training step, drawn uniformly with replacement (Table 2)"),
+        ],
+    ),
+    (
+        "Data",
+        &[
+            ("reward_scale", "factor on recorded rewards; keeps Q_r near the size of the cloning loss (O-4)"),
+            ("cost_scale", "factor on recorded costs and on kappa (O-4)"),
+            (
+                "kappa_scale",
+                "factor on kappa where it enters a network; 1 over the cost limit or over the largest kappa brings the input near 1 (O-8)",
+            ),
+            (
+                "normalize_states",
+                "whether the networks see states with mean 0 and variance 1; the image carries the constants (O-5)",
+            ),
+        ],
+    ),
+    (
+        "Networks",
+        &[
+            ("diffusion_steps", "denoising steps N of the policy (Eq. 11, Table 2)"),
+            ("hidden", "units of the denoiser's three hidden layers (Appendix B)"),
+            ("kappa_hidden", "hidden units of the kappa embedding, whose width the paper leaves open (O-8)"),
+            ("kappa_embedding", "entries of the kappa embedding (O-8)"),
+            ("time_code", "entries of the sinusoidal code of a denoising step; even (O-9)"),
+            ("time_hidden", "hidden units of the time embedding (O-9)"),
+            ("time_embedding", "entries of the time embedding (O-9)"),
+            ("trunk", "units of the critic's two shared layers (Appendix B)"),
+            ("head", "hidden units of a critic head, one layer (Appendix B, O-6)"),
+            ("dual_hidden", "units of the dual network's two hidden layers (Appendix B)"),
+        ],
+    ),
+    (
+        "Learning",
+        &[
+            ("actor_rate", "learning rate of the actor, Adam (Table 2)"),
+            ("critic_rate", "learning rate of the critic, Adam (Table 2)"),
+            ("dual_rate", "learning rate of the dual network, Adam (Appendix B)"),
+            ("target_rate", "soft update of the target critic at every step, tau (Appendix B)"),
+            ("reward_discount", "discount of the reward, gamma_r (Eq. 3, Table 2)"),
+            ("long_cost_discount", "discount of the long-term cost, gamma_cL (Eq. 3, Table 2)"),
+            ("short_cost_discount", "discount of the short-term cost, gamma_cS (Eq. 3, Table 2)"),
+            ("eta", "reward guidance coefficient (Eq. 14, Table 2)"),
+            (
+                "policy_gradient",
+                "how the gradient of Eq. 15 reaches the actor: `full`, through all steps of a sampled chain, or `one_step`, through the estimate of the clean action from the noised one, several times cheaper (O-13)",
+            ),
+            (
+                "target_sampler",
+                "sampler of the next action in the targets (Eq. 3): `ddpm`, or the deterministic `ddim`",
+            ),
+            ("target_steps", "steps of that sampler, at most diffusion_steps; fewer are cheaper"),
+            (
+                "relabel_share",
+                "share of samples whose kappa is relabelled with a larger budget, up to the data's largest; recorded kappa always ends at 0, so a clone learns to spend it all",
+            ),
+            (
+                "threshold",
+                "what Q_cL is held against (Eqs. 14 to 16): `kappa`, or `discounted`, kappa as it would be discounted if it were spent evenly over the rest of the episode",
+            ),
+            (
+                "dual_slack",
+                "added to that, in units of recorded cost; noise in Q_cL otherwise keeps the constraint violated at kappa 0",
+            ),
+            ("dual_normalize", "whether the violation is counted in limits instead of units of cost"),
+            ("final_rate", "learning rates at the last step as a share of the first, along half a cosine (O-30)"),
+            ("gradient_clip", "largest Euclidean norm of a network's gradient; 0 is no limit (O-30)"),
+            (
+                "actor_average",
+                "decay of a moving average of the actor's weights, which is exported in their place; 0 is none (O-10)",
+            ),
+        ],
+    ),
+    (
+        "Reweighting",
+        &[
+            ("reweight_warmup", "training steps before the weights are active (Table 2)"),
+            ("reweight_interval", "training steps between refreshes of the weights (Table 2)"),
+            ("reweight_ema", "share of the new value in the moving average of counterfactual weights (Table 2, O-21)"),
+            ("beta", "trajectory weight control coefficient: feasible trajectories weigh 1 + beta (Eq. 6, Table 2)"),
+            (
+                "feasible_mass",
+                "share of the weight that feasible trajectories get together (Eq. 7), in place of beta; 0 leaves it to beta",
+            ),
+            ("perturbations", "counterfactual samples K of a transition (Eq. 8, Table 2)"),
+            ("sigma", "standard deviation of counterfactual noise, in units of the action's bounds (Eq. 8, Table 2)"),
+            ("sigma_per_entry", "whether sigma counts in standard deviations of each recorded action entry"),
+            (
+                "counterfactual_reference",
+                "what Q_cS is held against in Eq. 8: `kappa`, which leaves a margin at kappa 0 and 1 only, or `realised`, the short-horizon cost that the trajectory itself incurred",
+            ),
+            ("counterfactual_tolerance", "added to that, in units of recorded cost"),
+            ("weight_min", "smallest weight, w_min (Eq. 10, Table 2)"),
+            ("weight_max", "largest weight, w_max (Eqs. 9 and 10, Table 2)"),
+        ],
+    ),
+];
+
+/// Columns of a terminal that a listing fits into.
+const WIDTH: usize = 80;
+/// Where the meanings of a listing start.
+const INDENT: usize = 6;
+/// The presets of a listing.
+const PRESETS: [Preset; 2] = [Preset::Paper, Preset::Quick];
+
+/// What an option means.
+pub fn meaning(key: &str) -> Option<&'static str> {
+    let mut entries = OPTIONS.iter().flat_map(|(_, entries)| *entries);
+    entries.find(|(other, _)| *other == key).map(|(_, meaning)| *meaning)
+}
+
+/// The value of a key in each preset, as it stands in `config.toml`; "given" for what belongs to a run.
+fn values(key: &str) -> [String; PRESETS.len()] {
+    PRESETS.map(|preset| {
+        let options = preset.config("", 0.0).options();
+        match options.get(key) {
+            Some(value) if !["data", "task", "limit"].contains(&key) => plain(value),
+            _ => "given".to_owned(),
+        }
+    })
+}
+
+/// A value without quotes.
+pub fn plain(value: &toml::Value) -> String {
+    value.as_str().map_or_else(|| value.to_string(), str::to_owned)
+}
+
+/// `docs/config.md`.
+pub fn document() -> String {
+    let mut text = String::from(
+        "# Options of a training run\n\n\
+         `armor-train fit --preset paper|quick` starts from a preset, and `--set key=value` replaces any option. \
+         `DIR/config.toml` keeps the effective values. `armor-train options` prints this list. \
+         This page is generated; `armor-train/src/config/options.rs` is its source.\n\n\
+         Equations, tables and appendices are the paper's. O-n are choices that the paper leaves open; \
+         the preset `paper` takes what the public code that the paper builds on does.\n",
+    );
+    for (group, entries) in OPTIONS {
+        let _ = write!(text, "\n## {group}\n\n| key | paper | quick | meaning |\n|---|---|---|---|\n");
+        for (key, meaning) in entries {
+            let [paper, quick] = values(key);
+            let _ = writeln!(text, "| `{key}` | {paper} | {quick} | {meaning} |");
+        }
+    }
+    text
+}
+
+/// The same in 80 columns.
+pub fn listing() -> String {
+    let mut text = String::new();
+    for (group, entries) in OPTIONS {
+        let _ = writeln!(text, "{}{group}", if text.is_empty() { "" } else { "\n" });
+        for (key, meaning) in entries {
+            let [paper, quick] = values(key);
+            let _ = if paper == quick {
+                writeln!(text, "  {key} = {paper}")
+            } else {
+                writeln!(text, "  {key} = {paper} (paper), {quick} (quick)")
+            };
+            wrap(&mut text, meaning);
+        }
+    }
+    text.trim_end().to_owned()
+}
+
+/// Appends words in indented lines.
+fn wrap(text: &mut String, words: &str) {
+    let mut column = 0;
+    for word in words.split_whitespace().map(|word| word.replace('`', "")) {
+        if column == 0 || column + 1 + word.chars().count() > WIDTH {
+            let _ = write!(text, "{}{:INDENT$}{word}", if column == 0 { "" } else { "\n" }, "");
+            column = INDENT + word.chars().count();
+        } else {
+            let _ = write!(text, " {word}");
+            column += 1 + word.chars().count();
+        }
+    }
+    text.push('\n');
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_document_of_options_is_what_the_table_says() {
+        crate::testing::assert_document("docs/config.md", &document());
+    }
+
+    #[test]
+    fn every_option_is_described_once_and_nothing_else() {
+        let mut described: Vec<&str> = OPTIONS.iter().flat_map(|(_, entries)| *entries).map(|entry| entry.0).collect();
+        described.sort_unstable();
+        let options = Preset::Paper.config("", 0.0).options();
+        let mut keys: Vec<&str> = options.keys().map(String::as_str).collect();
+        keys.sort_unstable();
+        assert_eq!(described, keys);
+    }
+
+    #[test]
+    fn every_choice_among_names_is_spelt_out() {
+        let mut config = Preset::Paper.config("", 0.0);
+        for key in ["preset", "policy_gradient", "target_sampler"] {
+            let names: Vec<&str> = meaning(key).unwrap().split('`').skip(1).step_by(2).collect();
+            assert!(names.len() >= 2);
+            for name in names {
+                config.set(&format!("{key}={name}")).unwrap();
+            }
+        }
+    }
+
+    #[test]
+    fn the_listing_fits_a_terminal_and_holds_every_key_and_word() {
+        let listing = listing();
+        assert!(listing.lines().all(|line| line.chars().count() <= WIDTH));
+        let words = |text: &str| text.replace('`', "").split_whitespace().map(str::to_owned).collect::<Vec<_>>();
+        let flat = words(&listing).join(" ");
+        for (key, meaning) in OPTIONS.iter().flat_map(|(_, entries)| *entries) {
+            assert!(listing.contains(&format!("\n  {key} = ")), "{key}");
+            assert!(flat.contains(&words(meaning).join(" ")), "{key}");
+        }
+        assert!(listing.contains("\n  batch = 512 (paper), 256 (quick)\n"));
+    }
+}
