@@ -25,7 +25,7 @@ pub const OPTIONS: [(&str, &[Entry]); 5] = [
     (
         "Data",
         &[
-            ("reward_scale", "factor on recorded rewards; keeps Q_r near the size of the cloning loss (O-4)"),
+            ("reward_scale", "factor on recorded rewards; 0.1 is what public code for these tasks takes (O-4)"),
             ("cost_scale", "factor on recorded costs and on kappa (O-4)"),
             (
                 "kappa_scale",

@@ -93,7 +93,7 @@ struct Short(f64);
 impl std::fmt::Display for Short {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let rounded: f64 = format!("{:.5e}", self.0).parse().unwrap_or(self.0);
-        if rounded != 0.0 && !(1e-4..1e9).contains(&rounded.abs()) {
+        if rounded != 0.0 && !(1e-2..1e9).contains(&rounded.abs()) {
             write!(f, "{rounded:e}")
         } else {
             write!(f, "{rounded}")
