@@ -1,5 +1,6 @@
 //! A run that is interrupted or killed at any moment, and goes on.
 
+use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::process::{Child, ChildStderr};
 use std::sync::mpsc;
@@ -115,7 +116,7 @@ fn a_run_that_is_killed_at_any_moment_ends_as_if_never_stopped() {
 fn a_run_that_is_killed_while_it_writes_ends_as_if_never_stopped() {
     let bench = Bench::new();
     let mut running = Running::start(&bench, false);
-    // Progress is read, so that the run never waits for its reader, and so that a run that writes in place is found out.
+    // Progress is read, so that the run never waits for its reader, and that one that writes in place is found out.
     let stderr = running.stderr.take().unwrap();
     let (sender, progress) = mpsc::channel();
     thread::spawn(move || stderr.lines().map_while(Result::ok).try_for_each(|line| sender.send(line)));
@@ -129,4 +130,21 @@ fn a_run_that_is_killed_while_it_writes_ends_as_if_never_stopped() {
     let steps = steps_done(&bench);
     assert!(steps.is_multiple_of(1000), "{steps}");
     ends_as_if_never_stopped(&bench, steps + 150);
+}
+
+/// Whoever has a file open keeps the old one whole: it is replaced, and never written in place.
+#[test]
+fn a_reader_of_a_runs_files_never_sees_a_part_of_one() {
+    let bench = Bench::new();
+    bench.success(&toy("run", 2, &[]));
+    let files = ["config.toml", "metrics.csv", "checkpoint.postcard"].map(|name| bench.path("run").join(name));
+    let mut open = files.each_ref().map(|path| File::open(path).unwrap());
+    let before = files.each_ref().map(|path| fs::read(path).unwrap());
+    bench.success(&toy("run", 102, &["--resume"]));
+    for ((path, open), before) in files.iter().zip(&mut open).zip(before) {
+        let mut still = Vec::new();
+        open.read_to_end(&mut still).unwrap();
+        assert!(still == before, "{} was written in place", path.display());
+        assert!(fs::read(path).unwrap() != before, "{} was not written", path.display());
+    }
 }

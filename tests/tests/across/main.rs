@@ -3,13 +3,15 @@
 //! | module | proves |
 //! |---|---|
 //! | [`whole_line`] | what flies is what was trained, from the recording to the plant |
-//! | [`image_faults`] | a damaged or foreign image or chip is named and never flown |
+//! | [`image_faults`] | a damaged or foreign image is named and never flown |
+//! | [`chip_faults`] | a damaged chip boots what was flashed to it, or nothing |
 //! | [`determinism`] | the same seed gives the same bits, on any number of threads and across any stop |
 //! | [`conformance`] | the method's invariants on recorded data, and where each of the others is tested |
 //!
 //! Networks here are tiny and runs short: nothing in these modules says how
 //! good a policy is, only that it is the one that was trained.
 
+mod chip_faults;
 mod conformance;
 mod determinism;
 mod fixture;
