@@ -5,10 +5,16 @@
 //! h      = trunk([s; scale kappa; a])
 //! Q_f,i  = head_f,i(h)                      f in {r, L, S}, i in {1, 2}
 //! ```
+//!
+//! [`CriticOptions`] has the layouts of the paper's ablation.
+
+mod options;
 
 use nalgebra::DMatrix;
 
 use crate::nn::{Activation, Mlp, Scalar, Tape};
+
+pub use options::{CostHeads, CostOutput, CriticOptions, Trunk, TwinLoss};
 
 /// What a pair of heads estimates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,71 +40,83 @@ impl Task {
     }
 }
 
-/// Layout of the critic within its parameters: trunk, then heads `r1 r2 L1 L2 S1 S2`.
+/// Layout of the critic within its parameters: trunks, then heads `r1 r2 L1 L2 S1 S2`.
 #[derive(Clone, Debug)]
 pub struct Critic {
     state: usize,
     action: usize,
     kappa_scale: f64,
-    trunk: Mlp,
-    heads: [[Mlp; 2]; 3],
+    options: CriticOptions,
+    /// One, or one for each pair of heads.
+    trunks: Vec<Mlp>,
+    /// The twins of each estimate.
+    heads: Vec<[Mlp; 2]>,
 }
 
 /// What a forward pass leaves behind; reused from step to step.
 #[derive(Clone, Debug)]
 pub struct CriticTape<T: Scalar> {
+    options: CriticOptions,
     input: DMatrix<T>,
-    trunk: Tape<T>,
-    heads: [[Tape<T>; 2]; 3],
-    /// Gradient with respect to the trunk's output from one head.
+    trunks: Vec<Tape<T>>,
+    heads: Vec<[Tape<T>; 2]>,
+    /// Gradient with respect to a trunk's output from one head.
     from_head: DMatrix<T>,
     /// Gradient with respect to the input.
     input_gradient: DMatrix<T>,
 }
 
 impl Critic {
-    /// A trunk of two layers of `trunk` units and heads of one hidden layer of `head` units;
-    /// the networks see `kappa_scale * kappa`.
+    /// The paper's critic: a trunk of two layers of `trunk` units and heads of one
+    /// hidden layer of `head` units; the networks see `kappa_scale * kappa`.
     pub fn new(state: usize, action: usize, trunk: usize, head: usize, kappa_scale: f64) -> Self {
-        let shared = Mlp::new(&[state + 1 + action, trunk, trunk], 0, Activation::Mish, true);
-        let mut end = shared.end();
-        let heads = [(); 3].map(|()| {
-            [(); 2].map(|()| {
-                let mlp = Mlp::new(&[trunk, head, 1], end, Activation::Mish, false);
-                end = mlp.end();
-                mlp
-            })
-        });
-        Self { state, action, kappa_scale, trunk: shared, heads }
+        Self::with_options(CriticOptions::default(), [state, action, trunk, head], kappa_scale)
+    }
+
+    /// As [`Critic::new`], for the widths `[state, action, trunk, head]` and another layout.
+    pub fn with_options(options: CriticOptions, widths: [usize; 4], kappa_scale: f64) -> Self {
+        let [state, action, trunk, head] = widths;
+        let mut end = 0;
+        let mut stack = |widths: &[usize], output| {
+            let mlp = Mlp::new(widths, end, Activation::Mish, output);
+            end = mlp.end();
+            mlp
+        };
+        let trunks =
+            (0..options.trunks()).map(|_| stack(&[state + 1 + action, trunk, trunk], Some(Activation::Mish))).collect();
+        let hidden = [[trunk].as_slice(), &vec![head; options.head_layers], &[1]].concat();
+        let heads = (0..options.heads()).map(|index| [(); 2].map(|()| stack(&hidden, options.output(index)))).collect();
+        Self { state, action, kappa_scale, options, trunks, heads }
     }
 
     /// Numbers of the network.
     pub fn size(&self) -> usize {
-        self.heads[2][1].end()
+        self.heads.last().map_or(0, |[_, last]| last.end())
     }
 
-    /// Numbers of the shared trunk, which come first.
+    /// Numbers of the trunks, which come first.
     pub fn trunk_size(&self) -> usize {
-        self.trunk.end()
+        self.trunks.last().map_or(0, Mlp::end)
     }
 
     /// PyTorch's default initialisation from draws in `[0, 1)`.
     pub fn initialise<T: Scalar>(&self, parameters: &mut [T], draws: &mut impl Iterator<Item = f64>) {
-        self.trunk.initialise(parameters, draws);
-        for head in self.heads.iter().flatten() {
-            head.initialise(parameters, draws);
+        for network in self.trunks.iter().chain(self.heads.iter().flatten()) {
+            network.initialise(parameters, draws);
         }
     }
 
     /// Room for passes over `samples` columns.
     pub fn tape<T: Scalar>(&self, samples: usize) -> CriticTape<T> {
         let inputs = self.state + 1 + self.action;
-        let trunk = self.trunk.tape(samples);
+        let trunks: Vec<Tape<T>> = self.trunks.iter().map(|trunk| trunk.tape(samples)).collect();
+        let hidden = trunks.first().map_or(0, |trunk| trunk.output().nrows());
         CriticTape {
+            options: self.options,
             input: DMatrix::zeros(inputs, samples),
-            from_head: DMatrix::zeros(trunk.output().nrows(), samples),
-            trunk,
-            heads: self.heads.each_ref().map(|twins| twins.each_ref().map(|head| head.tape(samples))),
+            from_head: DMatrix::zeros(hidden, samples),
+            trunks,
+            heads: self.heads.iter().map(|twins| twins.each_ref().map(|head| head.tape(samples))).collect(),
             input_gradient: DMatrix::zeros(inputs, samples),
         }
     }
@@ -118,10 +136,15 @@ impl Critic {
             *input = scale * kappa;
         }
         tape.input.rows_mut(self.state + 1, self.action).copy_from(action);
-        self.trunk.forward(parameters, &tape.input, &mut tape.trunk, slopes);
+        for (index, (trunk, trunk_tape)) in self.trunks.iter().zip(&mut tape.trunks).enumerate() {
+            if tasks.iter().any(|&task| self.options.trunk_of(task) == index) {
+                trunk.forward(parameters, &tape.input, trunk_tape, slopes);
+            }
+        }
         for &task in tasks {
-            for (head, head_tape) in self.heads[task as usize].iter().zip(&mut tape.heads[task as usize]) {
-                head.forward(parameters, tape.trunk.output(), head_tape, slopes);
+            let (index, hidden) = (self.options.head_of(task), tape.trunks[self.options.trunk_of(task)].output());
+            for (head, head_tape) in self.heads[index].iter().zip(&mut tape.heads[index]) {
+                head.forward(parameters, hidden, head_tape, slopes);
             }
         }
     }
@@ -129,8 +152,8 @@ impl Critic {
     /// The gradient of the task's losses (Eq. 4) from the last forward pass.
     ///
     /// Head gradients are added to `gradient`, as long as the parameters; the
-    /// trunk's gradient is written to `trunk_gradient`. Returns the summed loss
-    /// `sum_b sum_i (Q_i - y)^2`; gradients are those of the sum divided by `batch`.
+    /// gradient of the task's trunk is added to `trunk_gradient`. Returns the summed
+    /// loss `sum_b sum_i (Q_i - y)^2`; gradients are those of the sum divided by `batch`.
     pub fn backward_td<T: Scalar>(
         &self,
         parameters: &[T],
@@ -140,20 +163,22 @@ impl Critic {
         tape: &mut CriticTape<T>,
         (gradient, trunk_gradient): (&mut [T], &mut [T]),
     ) -> f64 {
-        let scale = T::of(2.0 / batch as f64);
+        let twin_share = self.options.twin_loss.share();
+        let scale = T::of(2.0 * twin_share / batch as f64);
+        let (pair, trunk) = (self.options.head_of(task), self.options.trunk_of(task));
+        let trunk_tape = &mut tape.trunks[trunk];
         let mut loss = 0.0;
-        for (index, head) in self.heads[task as usize].iter().enumerate() {
-            let head_tape = &mut tape.heads[task as usize][index];
+        for (index, head) in self.heads[pair].iter().enumerate() {
+            let head_tape = &mut tape.heads[pair][index];
             for (sample, &target) in target.iter().enumerate() {
                 let error = head_tape.output()[sample] - target;
-                loss += error.to_f64().powi(2);
+                loss += twin_share * error.to_f64().powi(2);
                 head_tape.output_gradient()[sample] = scale * error;
             }
-            let hidden = tape.trunk.output();
-            head.backward(parameters, hidden, head_tape, Some(gradient), Some(&mut tape.from_head));
-            add_head(&mut tape.trunk, &tape.from_head, index == 0);
+            head.backward(parameters, trunk_tape.output(), head_tape, Some(gradient), Some(&mut tape.from_head));
+            add_head(trunk_tape, &tape.from_head, index == 0);
         }
-        self.trunk.backward(parameters, &tape.input, &mut tape.trunk, Some(trunk_gradient), None);
+        self.trunks[trunk].backward(parameters, &tape.input, trunk_tape, Some(trunk_gradient), None);
         loss
     }
 
@@ -166,23 +191,28 @@ impl Critic {
         tape: &mut CriticTape<T>,
         action_gradient: &mut DMatrix<T>,
     ) {
-        let mut is_first = true;
+        let mut is_met = vec![false; self.trunks.len()];
         for &(task, slope) in slopes {
-            let [one, two] = &mut tape.heads[task as usize];
+            let (pair, trunk) = (self.options.head_of(task), self.options.trunk_of(task));
+            let [one, two] = &mut tape.heads[pair];
             for (sample, &slope) in slope.iter().enumerate() {
                 let first_is_worse = task.is_worse(one.output()[sample], two.output()[sample]);
                 one.output_gradient()[sample] = if first_is_worse { slope } else { T::zero() };
                 two.output_gradient()[sample] = if first_is_worse { T::zero() } else { slope };
             }
-            for (head, head_tape) in self.heads[task as usize].iter().zip([one, two]) {
-                head.backward(parameters, tape.trunk.output(), head_tape, None, Some(&mut tape.from_head));
-                add_head(&mut tape.trunk, &tape.from_head, is_first);
-                is_first = false;
+            for (head, head_tape) in self.heads[pair].iter().zip([one, two]) {
+                let trunk_tape = &mut tape.trunks[trunk];
+                head.backward(parameters, trunk_tape.output(), head_tape, None, Some(&mut tape.from_head));
+                add_head(trunk_tape, &tape.from_head, !is_met[trunk]);
+                is_met[trunk] = true;
             }
         }
-        let input_gradient = &mut tape.input_gradient;
-        self.trunk.backward(parameters, &tape.input, &mut tape.trunk, None, Some(input_gradient));
-        action_gradient.copy_from(&input_gradient.rows(self.state + 1, self.action));
+        action_gradient.fill(T::zero());
+        let trunks = self.trunks.iter().zip(&mut tape.trunks).zip(is_met);
+        for ((trunk, trunk_tape), _) in trunks.filter(|(_, is_met)| *is_met) {
+            trunk.backward(parameters, &tape.input, trunk_tape, None, Some(&mut tape.input_gradient));
+            *action_gradient += tape.input_gradient.rows(self.state + 1, self.action);
+        }
     }
 }
 
@@ -190,7 +220,7 @@ impl<T: Scalar> CriticTape<T> {
     /// The pessimistic twin of a task from the last forward pass: the minimum
     /// of rewards, the maximum of costs.
     pub fn pessimistic(&self, task: Task) -> impl Iterator<Item = T> {
-        let [one, two] = &self.heads[task as usize];
+        let [one, two] = &self.heads[self.options.head_of(task)];
         let twins = one.output().iter().zip(two.output().iter());
         twins.map(move |(&one, &two)| if task.is_worse(one, two) { one } else { two })
     }
@@ -222,88 +252,4 @@ pub fn bellman_target<T: Scalar>(
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::testing::{assert_gradient, fill};
-
-    const SAMPLES: usize = 5;
-
-    struct Fixture {
-        critic: Critic,
-        parameters: Vec<f64>,
-        state: DMatrix<f64>,
-        kappa: Vec<f64>,
-        action: DMatrix<f64>,
-        target: Vec<f64>,
-    }
-
-    fn fixture() -> Fixture {
-        let critic = Critic::new(3, 2, 6, 5, 0.5);
-        Fixture {
-            parameters: fill(critic.size(), 1),
-            state: DMatrix::from_vec(3, SAMPLES, fill(3 * SAMPLES, 2)),
-            kappa: vec![0.0, 1.0, 2.0, 3.0, 0.5],
-            action: DMatrix::from_vec(2, SAMPLES, fill(2 * SAMPLES, 3)),
-            target: fill(SAMPLES, 4),
-            critic,
-        }
-    }
-
-    #[test]
-    fn td_gradients_are_those_of_finite_differences() {
-        let f = fixture();
-        for task in Task::ALL {
-            let mut tape = f.critic.tape(SAMPLES);
-            let mut gradient = vec![0.0; f.critic.size()];
-            let mut trunk = vec![0.0; f.critic.trunk_size()];
-            f.critic.forward(&f.parameters, &[task], (&f.state, &f.kappa, &f.action), &mut tape, true);
-            f.critic.backward_td(&f.parameters, task, &f.target, SAMPLES, &mut tape, (&mut gradient, &mut trunk));
-            gradient[..trunk.len()].copy_from_slice(&trunk);
-            assert_gradient(&f.parameters, &gradient, |parameters| {
-                let mut tape = f.critic.tape(SAMPLES);
-                f.critic.forward(parameters, &[task], (&f.state, &f.kappa, &f.action), &mut tape, true);
-                let unused = (&mut gradient.clone()[..], &mut trunk.clone()[..]);
-                f.critic.backward_td(parameters, task, &f.target, SAMPLES, &mut tape, unused) / SAMPLES as f64
-            });
-        }
-    }
-
-    #[test]
-    fn action_gradients_are_those_of_finite_differences() {
-        let f = fixture();
-        let (reward_slope, cost_slope) = (fill(SAMPLES, 5), fill(SAMPLES, 6));
-        let tasks = [Task::Reward, Task::LongCost];
-        let mut tape = f.critic.tape(SAMPLES);
-        let mut gradient = DMatrix::zeros(2, SAMPLES);
-        f.critic.forward(&f.parameters, &tasks, (&f.state, &f.kappa, &f.action), &mut tape, true);
-        let slopes = [(Task::Reward, &reward_slope[..]), (Task::LongCost, &cost_slope[..])];
-        f.critic.action_gradient(&f.parameters, &slopes, &mut tape, &mut gradient);
-        assert_gradient(f.action.as_slice(), gradient.as_slice(), |action| {
-            let action = DMatrix::from_column_slice(2, SAMPLES, action);
-            let mut tape = f.critic.tape(SAMPLES);
-            f.critic.forward(&f.parameters, &tasks, (&f.state, &f.kappa, &action), &mut tape, false);
-            let sum = |task, slope: &[f64]| tape.pessimistic(task).zip(slope).map(|(q, s)| q * s).sum::<f64>();
-            sum(Task::Reward, &reward_slope) + sum(Task::LongCost, &cost_slope)
-        });
-    }
-
-    #[test]
-    fn pessimism_is_the_minimum_of_rewards_and_the_maximum_of_costs() {
-        let f = fixture();
-        let mut tape = f.critic.tape(SAMPLES);
-        f.critic.forward(&f.parameters, &Task::ALL, (&f.state, &f.kappa, &f.action), &mut tape, false);
-        for (task, choose) in Task::ALL.into_iter().zip([f64::min, f64::max, f64::max]) {
-            let [one, two] = &tape.heads[task as usize];
-            let expected: Vec<f64> = one.output().zip_map(two.output(), choose).iter().copied().collect();
-            assert_eq!(tape.pessimistic(task).collect::<Vec<_>>(), expected);
-            assert_ne!(one.output(), two.output());
-        }
-    }
-
-    #[test]
-    fn targets_bootstrap_only_where_the_episode_goes_on() {
-        let mut target = Vec::new();
-        bellman_target(&[1.0, 2.0], &[1.0, 0.0], 0.5, [10.0, 10.0].into_iter(), &mut target);
-        assert_eq!(target, [6.0, 2.0]);
-    }
-}
+mod tests;

@@ -27,7 +27,7 @@ pub struct DualTape<T: Scalar> {
 impl Dual {
     /// Two hidden layers of `hidden` units with ReLU; the network sees `kappa_scale * kappa`.
     pub fn new(hidden: usize, kappa_scale: f64) -> Self {
-        Self { kappa_scale, network: Mlp::new(&[1, hidden, hidden, 1], 0, Activation::Relu, false) }
+        Self { kappa_scale, network: Mlp::new(&[1, hidden, hidden, 1], 0, Activation::Relu, None) }
     }
 
     /// Numbers of the network.

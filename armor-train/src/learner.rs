@@ -11,10 +11,11 @@ use crate::data::Dataset;
 use crate::model::{Model, Optimisers, Parameters};
 use crate::nn::{Scalar, dot, soft_update};
 use crate::normaliser::Normaliser;
+use crate::pcgrad::{self, Order};
 use crate::reweight::{Reweighting, Weights};
 use crate::source::Source;
+use crate::stream;
 use crate::update::{CriticMetrics, Worker, update_actor, update_critic, update_target};
-use crate::{pcgrad, stream};
 
 /// Samples of a worker's share. A constant, so that the shares, and with them
 /// the order of all sums, do not depend on the machine.
@@ -122,7 +123,10 @@ impl<'d, T: Scalar> Learner<'d, T> {
                 stream::fill_normal(noise, first_stream + stage as u32, step * batch as u64 + sample as u64, out);
             }
         };
-        let [a, b, c, _] = noise.words(stream::SURGERY, step, 0);
+        let [a, b, c, _] = match self.config.pcgrad {
+            Order::Random => noise.words(stream::SURGERY, step, 0),
+            Order::Fixed | Order::Off => [0; 4],
+        };
         let LearnerState { parameters, optimisers, actor_average, .. } = &mut self.state;
         let (model, workers) = (&self.model, &mut self.workers);
 

@@ -7,9 +7,10 @@ use serde::{Deserialize, Serialize};
 use crate::actor::Actor;
 use crate::actor::denoiser::{Denoiser, Widths};
 use crate::config::Config;
-use crate::critic::Critic;
+use crate::critic::{Critic, CriticOptions, Trunk};
 use crate::dual::Dual;
 use crate::nn::{Adam, Scalar};
+use crate::pcgrad::{Order, Pooling};
 use crate::stream;
 
 /// Layouts and fixed settings of the networks.
@@ -27,6 +28,10 @@ pub struct Model {
     pub discounts: [f64; 3],
     /// Largest norm of a network's gradient; 0 is no limit.
     pub gradient_clip: f64,
+    /// Gradient surgery on the critic's trunk.
+    pub pcgrad: Order,
+    /// How the tasks' trunk gradients become one.
+    pub trunk_gradient: Pooling,
 }
 
 /// The numbers of all networks, each a flat vector.
@@ -78,10 +83,26 @@ impl Model {
                 eta: config.eta,
                 constraint_scale: if config.dual_normalize { 1.0 / (config.limit * config.cost_scale) } else { 1.0 },
             },
-            critic: Critic::new(state, action, config.trunk, config.head, config.kappa_scale),
+            critic: Critic::with_options(
+                CriticOptions {
+                    trunk: config.critic_trunk,
+                    cost_heads: config.cost_heads,
+                    head_layers: config.head_layers,
+                    cost_output: config.cost_output,
+                    twin_loss: config.twin_loss,
+                },
+                [state, action, config.trunk, config.head],
+                config.kappa_scale,
+            ),
             dual: Dual::new(config.dual_hidden, config.kappa_scale),
             target_chain: schedule.chain(config.target_sampler, config.target_steps).collect(),
             gradient_clip: config.gradient_clip,
+            pcgrad: config.pcgrad,
+            // Trunks of their own take their own gradients, which meet nowhere.
+            trunk_gradient: match config.critic_trunk {
+                Trunk::Shared => config.trunk_gradient,
+                Trunk::Separate => Pooling::Sum,
+            },
             discounts: [config.reward_discount, config.long_cost_discount, config.short_cost_discount],
         }
     }

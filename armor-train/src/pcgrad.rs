@@ -1,9 +1,33 @@
 //! Gradient surgery on the shared trunk (Eq. 5; Yu et al. 2020).
 
+use serde::{Deserialize, Serialize};
+
 use crate::nn::{Scalar, dot};
 
 /// Below this squared norm a gradient has no direction to project on.
 const NO_DIRECTION: f64 = 1e-12;
+
+/// In which order a task meets the others (O-17).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Order {
+    /// A random one for each task and step (the authors of PCGrad).
+    Random,
+    /// Reward, long-term cost, short-term cost.
+    Fixed,
+    /// No surgery ("w/o PCGrad", section 4.5).
+    Off,
+}
+
+/// How the tasks' gradients become one (O-17).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Pooling {
+    /// Their mean (the paper).
+    Mean,
+    /// Their sum.
+    Sum,
+}
 
 /// What gradient surgery saw of the original gradients.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -14,28 +38,37 @@ pub struct Surgery {
     pub norms: [f64; 3],
 }
 
-/// Projects each task's gradient off the others that it conflicts with, and averages.
+/// Projects each task's gradient off the others that it conflicts with, and averages or adds.
 ///
 /// For task `i`, in the order `orders[i]`, `g_i <- g_i - (g_i . g_j) / |g_j|^2 g_j`
-/// wherever `g_i . g_j < 0`; `g_j` is always the original gradient. The mean of
-/// the results is added to `out`.
-pub fn project<T: Scalar>(gradients: &[Vec<T>; 3], orders: &[[usize; 2]; 3], out: &mut [T]) -> Surgery {
+/// wherever `g_i . g_j < 0`; `g_j` is always the original gradient. Without
+/// `orders` the gradients stay as they are. What they become together is added to `out`.
+pub fn project<T: Scalar>(
+    gradients: &[Vec<T>; 3],
+    orders: Option<&[[usize; 2]; 3]>,
+    pooling: Pooling,
+    out: &mut [T],
+) -> Surgery {
     // All inner products of the originals; a projection changes them by these alone.
     let gram = gradients.each_ref().map(|a| gradients.each_ref().map(|b| dot(a, b)));
     let conflicts = [(0, 1), (0, 2), (1, 2)].into_iter().filter(|&(i, j)| gram[i][j] < 0.0).count();
     // The result is a combination of the originals: find its coefficients first.
     let mut coefficients = [0.0; 3];
-    for (i, order) in orders.iter().enumerate() {
+    let parts = match pooling {
+        Pooling::Mean => 3.0,
+        Pooling::Sum => 1.0,
+    };
+    for i in 0..3 {
         let mut own = [0.0; 3];
         own[i] = 1.0;
-        for &j in order {
+        for &j in orders.iter().flat_map(|orders| &orders[i]) {
             let inner: f64 = own.iter().zip(gram).map(|(coefficient, row)| coefficient * row[j]).sum();
             if inner < 0.0 && gram[j][j] > NO_DIRECTION {
                 own[j] -= inner / gram[j][j];
             }
         }
         for (sum, own) in coefficients.iter_mut().zip(own) {
-            *sum += own / 3.0;
+            *sum += own / parts;
         }
     }
     let [x, y, z] = coefficients.map(T::of);
@@ -85,7 +118,7 @@ mod tests {
             for words in 0..8 {
                 let orders = orders([words & 1, words >> 1 & 1, words >> 2]);
                 let mut out = vec![0f64; 4];
-                project(&gradients, &orders, &mut out);
+                project(&gradients, Some(&orders), Pooling::Mean, &mut out);
                 for (out, expected) in out.iter().zip(by_the_letter(&gradients, &orders)) {
                     assert!((out - expected).abs() < 1e-12, "{out} is not {expected}");
                 }
@@ -96,7 +129,7 @@ mod tests {
     #[test]
     fn identical_gradients_are_unchanged() {
         let mut out = vec![0f64; 3];
-        assert_eq!(project(&[0; 3].map(|_| vec![1.0, -2.0, 3.0]), &ORDERS, &mut out).conflicts, 0);
+        assert_eq!(project(&[0; 3].map(|_| vec![1.0, -2.0, 3.0]), Some(&ORDERS), Pooling::Mean, &mut out).conflicts, 0);
         for (out, expected) in out.iter().zip([1.0, -2.0, 3.0]) {
             assert!((out - expected).abs() < 1e-12);
         }
@@ -107,16 +140,30 @@ mod tests {
         // The third task is silent, so only the first two meet.
         let (a, b) = (vec![1.0, 0.0], vec![-1.0, 1.0]);
         let mut out = vec![0f64; 2];
-        assert_eq!(project(&[a.clone(), b.clone(), vec![0.0; 2]], &ORDERS, &mut out).conflicts, 1);
+        assert_eq!(project(&[a.clone(), b.clone(), vec![0.0; 2]], Some(&ORDERS), Pooling::Mean, &mut out).conflicts, 1);
         // a off b is (0.5, 0.5), b off a is (0, 1).
         assert!((out[0] - 0.5 / 3.0).abs() < 1e-12);
         assert!((out[1] - 1.5 / 3.0).abs() < 1e-12);
     }
 
     #[test]
+    fn without_surgery_gradients_are_averaged_or_added_as_they_are() {
+        let gradients = [vec![1.0, 0.0], vec![-1.0, 1.0], vec![0.0, 2.0]];
+        for (pooling, expected) in [(Pooling::Mean, [0.0, 1.0]), (Pooling::Sum, [0.0, 3.0])] {
+            let mut out = vec![0f64; 2];
+            assert_eq!(project(&gradients, None, pooling, &mut out).conflicts, 1, "conflicts are counted all the same");
+            assert_eq!(out, expected);
+        }
+    }
+
+    #[test]
     fn opposed_gradients_cancel() {
         let mut out = vec![0f64; 2];
-        assert_eq!(project(&[vec![1.0, 1.0], vec![-2.0, -2.0], vec![0.0; 2]], &ORDERS, &mut out).conflicts, 1);
+        assert_eq!(
+            project(&[vec![1.0, 1.0], vec![-2.0, -2.0], vec![0.0; 2]], Some(&ORDERS), Pooling::Mean, &mut out)
+                .conflicts,
+            1
+        );
         assert!(out.iter().all(|value: &f64| value.abs() < 1e-12));
     }
 
@@ -125,12 +172,12 @@ mod tests {
         let third = |angle: f64| vec![angle.cos(), angle.sin()];
         let mut out = vec![0f64; 2];
         let spread = [0.0, 1.0, 2.0].map(|k| third(k * std::f64::consts::TAU / 3.0));
-        assert_eq!(project(&spread, &ORDERS, &mut out).conflicts, 3);
+        assert_eq!(project(&spread, Some(&ORDERS), Pooling::Mean, &mut out).conflicts, 3);
     }
 
     #[test]
     fn norms_are_those_of_the_originals() {
         let gradients = [vec![3.0, 4.0], vec![-1.0, 0.0], vec![0.0, 0.0]];
-        assert_eq!(project(&gradients, &ORDERS, &mut [0f64; 2]).norms, [5.0, 1.0, 0.0]);
+        assert_eq!(project(&gradients, Some(&ORDERS), Pooling::Mean, &mut [0f64; 2]).norms, [5.0, 1.0, 0.0]);
     }
 }

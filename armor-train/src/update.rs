@@ -14,7 +14,7 @@ use crate::batch::Batch;
 use crate::critic::{CriticTape, Task, bellman_target};
 use crate::model::{Model, Optimisers, Parameters};
 use crate::nn::{Scalar, accumulate, clip_norm, soft_update};
-use crate::pcgrad::{self, Surgery};
+use crate::pcgrad::{self, Order, Surgery};
 
 /// A share of the batch, and room for everything that is computed from it.
 #[derive(Clone, Debug)]
@@ -163,7 +163,8 @@ pub fn update_critic<T: Scalar>(
             *sum += part / batch_len as f64;
         }
     }
-    metrics.surgery = pcgrad::project(&trunk, orders, &mut gradient[..model.critic.trunk_size()]);
+    let orders = (model.pcgrad != Order::Off).then_some(orders);
+    metrics.surgery = pcgrad::project(&trunk, orders, model.trunk_gradient, &mut gradient[..model.critic.trunk_size()]);
     clip_norm(&mut gradient, model.gradient_clip);
     optimisers.critic.descend(&mut parameters.critic, &gradient);
     (metrics, gradient)

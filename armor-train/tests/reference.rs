@@ -10,6 +10,7 @@ use armor_train::critic::{Critic, Task};
 use armor_train::dual::Dual;
 use armor_train::model::{Model, Optimisers, Parameters};
 use armor_train::nn::Adam;
+use armor_train::pcgrad::{Order, Pooling};
 use armor_train::reweight::Weights;
 use armor_train::reweight::counterfactual::Counterfactual;
 use armor_train::update::{Worker, update_actor, update_critic, update_target};
@@ -81,6 +82,8 @@ impl Reference {
             target_chain: schedule.chain(Sampler::Ddpm, STEPS).collect(),
             discounts: [0.99, 0.99, 0.3],
             gradient_clip: 0.0,
+            pcgrad: Order::Random,
+            trunk_gradient: Pooling::Mean,
         }
     }
 

@@ -117,11 +117,11 @@ impl Denoiser {
         let Widths {
             state, action, hidden, kappa_hidden, kappa_embedding, time_code, time_hidden, time_embedding, ..
         } = widths;
-        let kappa = Mlp::new(&[1, kappa_hidden, kappa_hidden, kappa_embedding], 0, Activation::Mish, false);
-        let time = Mlp::new(&[time_code, time_hidden, time_embedding], kappa.end(), Activation::Mish, false);
+        let kappa = Mlp::new(&[1, kappa_hidden, kappa_hidden, kappa_embedding], 0, Activation::Mish, None);
+        let time = Mlp::new(&[time_code, time_hidden, time_embedding], kappa.end(), Activation::Mish, None);
         let inputs = action + state + kappa_embedding + time_embedding;
         let first = Linear { inputs, outputs: hidden, offset: time.end() };
-        let body = Mlp::new(&[hidden, hidden, hidden, action], first.end(), Activation::Mish, false);
+        let body = Mlp::new(&[hidden, hidden, hidden, action], first.end(), Activation::Mish, None);
         Self { widths, kappa_scale, kappa, time, first, body }
     }
 

@@ -75,6 +75,7 @@ impl Config {
         )?;
         let is_code = self.time_code >= 4 && self.time_code.is_multiple_of(2) && self.time_code <= 1024;
         require("time_code", is_code, "even and between 4 and 1024")?;
+        require("head_layers", (1..=2).contains(&self.head_layers), "1 or 2")?;
         require("reweight_interval", self.reweight_interval >= 1, "at least 1")?;
         let ordered = 0.0 <= self.weight_min && self.weight_min <= self.weight_max && self.weight_max.is_finite();
         require("weight_max", ordered, "a number of at least weight_min, and weight_min at least 0")
@@ -91,7 +92,15 @@ mod tests {
 
     #[test]
     fn an_option_out_of_range_is_named() {
-        for bad in ["batch=0", "target_steps=21", "diffusion_steps=65", "time_code=5", "weight_max=0.1", "eta=nan"] {
+        for bad in [
+            "batch=0",
+            "target_steps=21",
+            "diffusion_steps=65",
+            "time_code=5",
+            "weight_max=0.1",
+            "eta=nan",
+            "head_layers=0",
+        ] {
             let mut config = Preset::Paper.config("ball-run", 5.0);
             config.set(bad).unwrap();
             let error = config.check().unwrap_err().to_string();

@@ -9,6 +9,8 @@ use armor_core::schedule::Sampler;
 use serde::{Deserialize, Serialize};
 
 use crate::actor::PolicyGradient;
+use crate::critic::{CostHeads, CostOutput, Trunk, TwinLoss};
+use crate::pcgrad::{Order, Pooling};
 use crate::reweight::reference::Reference;
 use crate::threshold::Threshold;
 
@@ -58,8 +60,16 @@ pub struct Config {
     pub time_embedding: usize,
     /// Units of the critic's two shared layers (Appendix B).
     pub trunk: usize,
-    /// Hidden units of a critic head (Appendix B, O-6).
+    /// Hidden units of a critic head (Appendix B).
     pub head: usize,
+    /// Hidden layers of a critic head, 1 or 2 (O-6).
+    pub head_layers: usize,
+    /// What the critic's estimates share; a trunk in the paper (section 4.5).
+    pub critic_trunk: Trunk,
+    /// Pairs of heads that estimate costs; one for each horizon in the paper (section 4.5).
+    pub cost_heads: CostHeads,
+    /// What follows the last layer of a cost head (O-7).
+    pub cost_output: CostOutput,
     /// Units of the dual network's two hidden layers (Appendix B).
     pub dual_hidden: usize,
 
@@ -71,6 +81,12 @@ pub struct Config {
     pub dual_rate: f64,
     /// Soft update of the target critic, tau (Appendix B).
     pub target_rate: f64,
+    /// How the losses of a critic's twins are joined (O-11).
+    pub twin_loss: TwinLoss,
+    /// Order of gradient surgery on the shared trunk (Eq. 5, O-17), or none (section 4.5).
+    pub pcgrad: Order,
+    /// How the tasks' trunk gradients become one (Eq. 5, O-17).
+    pub trunk_gradient: Pooling,
     /// Discount of the reward, `gamma_r` (Table 2).
     pub reward_discount: f64,
     /// Discount of the long-term cost, `gamma_cL` (Table 2).

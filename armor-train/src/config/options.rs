@@ -48,7 +48,23 @@ pub const OPTIONS: [(&str, &[Entry]); 5] = [
             ("time_hidden", "hidden units of the time embedding (O-9)"),
             ("time_embedding", "entries of the time embedding (O-9)"),
             ("trunk", "units of the critic's two shared layers (Appendix B)"),
-            ("head", "hidden units of a critic head, one layer (Appendix B, O-6)"),
+            ("head", "hidden units of a critic head (Appendix B)"),
+            (
+                "head_layers",
+                "hidden layers of a critic head, 1 or 2; the paper's \"2-layer\" can be read as either (O-6)",
+            ),
+            (
+                "critic_trunk",
+                "what the critic's estimates share: `shared`, one trunk, or `separate`, independent critics with a trunk each, on which gradient surgery has nothing to do (section 4.5)",
+            ),
+            (
+                "cost_heads",
+                "heads that estimate costs: `per_horizon`, or `single`, one pair that learns the targets of both horizons (section 4.5)",
+            ),
+            (
+                "cost_output",
+                "what follows the last layer of a cost head: `linear`, or `softplus`, with which no estimate is 0, so that the indicator of Eq. 8 never holds at kappa 0 (O-7)",
+            ),
             ("dual_hidden", "units of the dual network's two hidden layers (Appendix B)"),
         ],
     ),
@@ -59,6 +75,12 @@ pub const OPTIONS: [(&str, &[Entry]); 5] = [
             ("critic_rate", "learning rate of the critic, Adam (Table 2)"),
             ("dual_rate", "learning rate of the dual network, Adam (Appendix B)"),
             ("target_rate", "soft update of the target critic at every step, tau (Appendix B)"),
+            ("twin_loss", "how the losses of a critic's twins are joined: `sum` or `mean` (Eq. 4, O-11)"),
+            (
+                "pcgrad",
+                "gradient surgery on the shared trunk (Eq. 5): each task meets the others in `random` or `fixed` order, or `off`, not at all (O-17, section 4.5)",
+            ),
+            ("trunk_gradient", "how the tasks' trunk gradients become one: `mean` or `sum` (Eq. 5, O-17)"),
             ("reward_discount", "discount of the reward, gamma_r (Eq. 3, Table 2)"),
             ("long_cost_discount", "discount of the long-term cost, gamma_cL (Eq. 3, Table 2)"),
             ("short_cost_discount", "discount of the short-term cost, gamma_cS (Eq. 3, Table 2)"),
@@ -222,9 +244,11 @@ mod tests {
     #[test]
     fn every_choice_among_names_is_spelt_out() {
         let mut config = Preset::Paper.config("", 0.0);
-        for key in ["preset", "policy_gradient", "target_sampler"] {
-            let names: Vec<&str> = meaning(key).unwrap().split('`').skip(1).step_by(2).collect();
-            assert!(names.len() >= 2);
+        let named =
+            config.options().into_iter().filter(|(key, value)| value.is_str() && !["data", "task"].contains(&&**key));
+        for (key, _) in named {
+            let names: Vec<&str> = meaning(&key).unwrap().split('`').skip(1).step_by(2).collect();
+            assert!(names.len() >= 2, "{key}");
             for name in names {
                 config.set(&format!("{key}={name}")).unwrap();
             }

@@ -5,6 +5,8 @@ use serde::{Deserialize, Serialize};
 
 use super::Config;
 use crate::actor::PolicyGradient;
+use crate::critic::{CostHeads, CostOutput, Trunk, TwinLoss};
+use crate::pcgrad::{Order, Pooling};
 use crate::reweight::reference::Reference;
 use crate::threshold::Threshold;
 
@@ -51,11 +53,18 @@ impl Preset {
             time_embedding: 16,
             trunk: 256,
             head: 128,
+            head_layers: 1,
+            critic_trunk: Trunk::Shared,
+            cost_heads: CostHeads::PerHorizon,
+            cost_output: CostOutput::Linear,
             dual_hidden: 256,
             actor_rate: 1e-4,
             critic_rate: 1e-3,
             dual_rate: 1e-4,
             target_rate: 0.005,
+            twin_loss: TwinLoss::Sum,
+            pcgrad: Order::Random,
+            trunk_gradient: Pooling::Mean,
             reward_discount: 0.99,
             long_cost_discount: 0.99,
             short_cost_discount: 0.3,

@@ -12,6 +12,8 @@ pub enum Activation {
     Mish,
     /// `max(0, x)`: the dual network (Appendix B).
     Relu,
+    /// `ln(1 + e^x)`: an output that is never negative (O-7).
+    Softplus,
 }
 
 impl Activation {
@@ -47,6 +49,21 @@ impl Activation {
             (Self::Mish, Some(slopes)) => columns
                 .zip(slopes.as_mut_slice().chunks_exact_mut(rows))
                 .for_each(|((values, bias), slopes)| T::mish_column_with_slopes(values, slopes, bias)),
+            (Self::Softplus, slopes) => {
+                let mut slopes = slopes.map(|slopes| slopes.as_mut_slice().iter_mut());
+                for (values, bias) in columns {
+                    for (value, &bias) in values.iter_mut().zip(bias) {
+                        let sum = *value + bias;
+                        // `e^-|x|` cannot overflow.
+                        let tail = (-sum.abs()).exp();
+                        *value = sum.max(T::zero()) + tail.ln_1p();
+                        if let Some(slope) = slopes.as_mut().and_then(Iterator::next) {
+                            let part = if sum > T::zero() { T::one() } else { tail };
+                            *slope = part / (T::one() + tail);
+                        }
+                    }
+                }
+            }
             (Self::Relu, None) => columns.for_each(|(values, bias)| {
                 values.iter_mut().zip(bias).for_each(|(value, &bias)| *value = (*value + bias).max(T::zero()));
             }),

@@ -10,8 +10,8 @@ use super::{Activation, Linear, Scalar};
 pub struct Mlp {
     layers: Vec<Linear>,
     activation: Activation,
-    /// Whether the last layer is followed by the activation as well.
-    activate_output: bool,
+    /// What follows the last layer; nothing where its sums are the output.
+    output: Option<Activation>,
 }
 
 /// What a forward pass leaves behind for the backward pass; reused from step to step.
@@ -46,14 +46,15 @@ impl<T: Scalar> Tape<T> {
 }
 
 impl Mlp {
-    /// A stack through the given widths, its numbers from index `offset` on.
-    pub fn new(widths: &[usize], offset: usize, activation: Activation, activate_output: bool) -> Self {
+    /// A stack through the given widths, its numbers from index `offset` on, with
+    /// `activation` between layers and `output` behind the last.
+    pub fn new(widths: &[usize], offset: usize, activation: Activation, output: Option<Activation>) -> Self {
         let mut layers: Vec<Linear> = Vec::new();
         for pair in widths.windows(2) {
             let offset = layers.last().map_or(offset, Linear::end);
             layers.push(Linear { inputs: pair[0], outputs: pair[1], offset });
         }
-        Self { layers, activation, activate_output }
+        Self { layers, activation, output }
     }
 
     /// The layers, first to last.
@@ -72,8 +73,9 @@ impl Mlp {
         Tape { values: room(), slopes: room(), deltas: room(), columns: samples }
     }
 
-    fn is_activated(&self, layer: usize) -> bool {
-        self.activate_output || layer + 1 < self.layers.len()
+    /// What follows a layer.
+    fn activation(&self, layer: usize) -> Option<Activation> {
+        if layer + 1 < self.layers.len() { Some(self.activation) } else { self.output }
     }
 
     /// Runs the stack on `input`, `inputs x samples`; with `slopes`, a backward pass may follow.
@@ -85,10 +87,9 @@ impl Mlp {
             let values = &mut rest[0];
             product(values.as_mut_slice(), layer.weights(parameters), input.into(), Update::Replace);
             let bias = layer.bias(parameters);
-            if self.is_activated(index) {
-                self.activation.apply(values, slopes.then_some(&mut tape.slopes[index]), bias);
-            } else {
-                add_bias(values, bias);
+            match self.activation(index) {
+                Some(activation) => activation.apply(values, slopes.then_some(&mut tape.slopes[index]), bias),
+                None => add_bias(values, bias),
             }
         }
     }
@@ -108,7 +109,7 @@ impl Mlp {
     ) {
         let columns = tape.columns;
         for (index, layer) in self.layers.iter().enumerate().rev() {
-            if self.is_activated(index) {
+            if self.activation(index).is_some() {
                 scale(&mut tape.deltas[index], &tape.slopes[index], columns);
             }
             let (before, rest) = tape.deltas.split_at_mut(index);
@@ -176,8 +177,8 @@ mod tests {
     use super::*;
     use crate::testing::{assert_gradient, fill};
 
-    fn check(activation: Activation, activate_output: bool) {
-        let mlp = Mlp::new(&[3, 8, 7, 2], 0, activation, activate_output);
+    fn check(activation: Activation, output: Option<Activation>) {
+        let mlp = Mlp::new(&[3, 8, 7, 2], 0, activation, output);
         let parameters: Vec<f64> = fill(mlp.end(), 1);
         let input = DMatrix::from_vec(3, 6, fill(18, 2));
         let seed = DMatrix::from_vec(2, 6, fill(12, 3));
@@ -202,14 +203,15 @@ mod tests {
 
     #[test]
     fn gradients_are_those_of_finite_differences() {
-        check(Activation::Mish, false);
-        check(Activation::Mish, true);
-        check(Activation::Relu, false);
+        check(Activation::Mish, None);
+        check(Activation::Mish, Some(Activation::Mish));
+        check(Activation::Mish, Some(Activation::Softplus));
+        check(Activation::Relu, None);
     }
 
     #[test]
     fn a_second_backward_pass_adds_to_the_gradient() {
-        let mlp = Mlp::new(&[2, 3, 1], 0, Activation::Mish, false);
+        let mlp = Mlp::new(&[2, 3, 1], 0, Activation::Mish, None);
         let parameters: Vec<f64> = fill(mlp.end(), 1);
         let input = DMatrix::from_vec(2, 4, fill(8, 2));
         let mut tape = mlp.tape(4);
