@@ -1,6 +1,15 @@
-//! Options by name: `--set key=value`.
+//! Options by name.
 
+use super::options::plain;
 use super::{Config, ConfigError};
+
+/// The two sides of `key=value`; text needs no quotes.
+pub(super) fn parse_assignment(assignment: &str) -> Result<(&str, toml::Value), ConfigError> {
+    let (key, value) = assignment.split_once('=').ok_or_else(|| ConfigError::NotAnAssignment(assignment.to_owned()))?;
+    let (key, value) = (key.trim(), value.trim());
+    let parsed = toml::from_str::<toml::Table>(&format!("value = {value}")).ok();
+    Ok((key, parsed.and_then(|mut table| table.remove("value")).unwrap_or_else(|| value.into())))
+}
 
 impl Config {
     /// Replaces one option by `key=value`; text needs no quotes.
@@ -8,27 +17,32 @@ impl Config {
     /// # Errors
     /// [`ConfigError`] that names the nearest key where there is none of that name.
     pub fn set(&mut self, assignment: &str) -> Result<(), ConfigError> {
-        let (key, value) =
-            assignment.split_once('=').ok_or_else(|| ConfigError::NotAnAssignment(assignment.to_owned()))?;
-        let (key, value) = (key.trim(), value.trim());
-        let bad = |reason: String| ConfigError::BadValue { key: key.to_owned(), value: value.to_owned(), reason };
+        let (key, value) = parse_assignment(assignment)?;
+        self.replace(key, value)
+    }
+
+    /// Replaces one option; a whole number is welcome where a fraction is expected.
+    ///
+    /// # Errors
+    /// [`ConfigError::UnknownKey`] and [`ConfigError::BadValue`]; nothing is replaced then.
+    pub(super) fn replace(&mut self, key: &str, value: toml::Value) -> Result<(), ConfigError> {
         let mut table = self.options();
         if !table.contains_key(key) {
             let similarity = |name: &&String| (strsim::jaro_winkler(name, key) * 1e6) as u64;
             let nearest = table.keys().max_by_key(similarity).cloned().unwrap_or_default();
             return Err(ConfigError::UnknownKey { key: key.to_owned(), nearest });
         }
-        let parsed = match toml::from_str::<toml::Table>(&format!("value = {value}")) {
-            Ok(mut parsed) => parsed.remove("value").unwrap_or_else(|| value.into()),
-            Err(_) => value.into(),
-        };
-        // A whole number is welcome where a fraction is expected.
-        let parsed = match (&table[key], parsed) {
+        let shown = plain(&value);
+        let value = match (&table[key], value) {
             (toml::Value::Float(_), toml::Value::Integer(whole)) => toml::Value::Float(whole as f64),
-            (_, parsed) => parsed,
+            (_, value) => value,
         };
-        table.insert(key.to_owned(), parsed);
-        *self = table.try_into().map_err(|error: toml::de::Error| bad(error.message().to_owned()))?;
+        table.insert(key.to_owned(), value);
+        *self = table.try_into().map_err(|error: toml::de::Error| ConfigError::BadValue {
+            key: key.to_owned(),
+            value: shown,
+            reason: error.message().to_owned(),
+        })?;
         Ok(())
     }
 

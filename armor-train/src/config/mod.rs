@@ -2,8 +2,11 @@
 
 mod assign;
 mod check;
+mod given;
 pub mod options;
 mod preset;
+
+use std::path::PathBuf;
 
 use armor_core::schedule::Sampler;
 use serde::{Deserialize, Serialize};
@@ -14,6 +17,7 @@ use crate::pcgrad::{Order, Pooling};
 use crate::reweight::reference::Reference;
 use crate::threshold::Threshold;
 
+pub use given::Given;
 pub use preset::Preset;
 
 /// The effective configuration of a run; it is saved as `config.toml` in the run's folder.
@@ -151,6 +155,28 @@ pub struct Config {
 /// Why a configuration cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum ConfigError {
+    /// A file that cannot be parsed.
+    #[error("{}: line {line} is no TOML: {reason}", file.display())]
+    NotToml {
+        /// The file.
+        file: PathBuf,
+        /// The line, counted from 1.
+        line: usize,
+        /// What was expected.
+        reason: String,
+    },
+    /// A key without which no run can start.
+    #[error("--{key} is missing; give it, or `{key}` in the file of --config")]
+    Missing {
+        /// The option.
+        key: &'static str,
+    },
+    /// A task that the paper does not have, without a cost limit.
+    #[error("--limit is missing: {task} is no task of the paper, whose limit would be known")]
+    NoLimit {
+        /// The task.
+        task: String,
+    },
     /// A `--set` without `=`.
     #[error("`{0}` is not of the form key=value")]
     NotAnAssignment(String),

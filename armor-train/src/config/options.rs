@@ -16,7 +16,7 @@ pub const OPTIONS: [(&str, &[Entry]); 5] = [
             ("preset", "named set of choices that the other keys started from: `paper` or `quick`"),
             ("data", "path of the recorded data; given by --data"),
             ("task", "task that was recorded, such as ball-run; given by --task"),
-            ("limit", "cost limit d of an episode, in units of recorded cost (Eq. 1); given by --limit"),
+            ("limit", "cost limit d of an episode, in units of recorded cost (Eq. 1); given by --limit, else the paper's for the task"),
             ("seed", "seed of everything random; given by --seed"),
             ("steps", "training steps (Table 2); given by --steps"),
             ("batch", "transitions of a training step, drawn uniformly with replacement (Table 2)"),
@@ -173,7 +173,9 @@ pub fn plain(value: &toml::Value) -> String {
 pub fn document() -> String {
     let mut text = String::from(
         "# Options of a training run\n\n\
-         `armor-train fit --preset paper|quick` starts from a preset, and `--set key=value` replaces any option. \
+         `armor-train fit --preset paper|quick` starts from a preset. The file of `--config FILE.toml` replaces any of \
+         its options, `--set key=value` those of the file, and the flags `--data`, `--task`, `--limit`, `--steps` and \
+         `--seed` win over both. \
          `DIR/config.toml` keeps the effective values. `armor-train options` prints this list. \
          This page is generated; `armor-train/src/config/options.rs` is its source.\n\n\
          Equations, tables and appendices are the paper's. O-n are choices that the paper leaves open; \

@@ -40,6 +40,27 @@ fn an_option_that_cannot_be_set_is_bad_usage_and_says_what_can() {
 }
 
 #[test]
+fn a_file_of_options_that_cannot_be_used_is_named() {
+    let bench = Bench::new();
+    let with = |text: &str| {
+        bench.put("options.toml", text.as_bytes());
+        bench.misuse(&toy("run", 1, &["--config", "options.toml"]))
+    };
+    assert!(with("eta = 1\nbeta =").contains("options.toml: line 2 is no TOML"));
+    assert!(with("actor_lr = 1").contains("there is no option `actor_lr`; did you mean `actor_rate`?"));
+    assert!(with("normalize_states = \"yes\"").contains("option `normalize_states` cannot be `yes`"));
+    assert!(with("weight_max = 0.1").contains("option `weight_max` must be"));
+    let error = bench.failure(&toy("run", 1, &["--config", "none.toml"]));
+    assert!(error.contains("cannot read none.toml"), "{error}");
+
+    let missing = |arguments: &[&str]| bench.misuse(&[&["fit", "--out", "run"], arguments].concat());
+    assert!(missing(&["--data", "small.hdf5"]).contains("--task is missing"));
+    assert!(missing(&["--task", "toy"]).contains("--data is missing"));
+    assert!(missing(&["--data", "small.hdf5", "--task", "toy"]).contains("--limit is missing: toy is no task"));
+    assert_eq!(bench.names("."), ["options.toml", "small.hdf5"]);
+}
+
+#[test]
 fn what_is_no_recording_is_named_by_every_command_that_reads_one() {
     let bench = Bench::new();
     let small = bench.bytes("small.hdf5");
@@ -118,16 +139,15 @@ fn only_the_same_run_is_resumed() {
 
     bench.success(&toy("run", 2, &[]));
     let before = (bench.bytes("run/checkpoint.postcard"), bench.bytes("run/config.toml"));
-    for (more, key) in [
-        (&["--set", "beta=0.7"][..], "beta"),
-        (&["--set", "hidden=9"], "hidden"),
-        (&["--seed", "1"], "seed"),
-        (&["--set", "task=top"], "task"),
-    ] {
+    for (more, key) in
+        [(&["--set", "beta=0.7"][..], "beta"), (&["--set", "hidden=9"], "hidden"), (&["--seed", "1"], "seed")]
+    {
         let error = bench.failure(&toy("run", 4, &[&["--resume"], more].concat()));
         let expected = format!("run has another `{key}`; resume it with the options it was started with");
         assert!(error.ends_with(&expected), "{error}");
     }
+    let error = bench.failure(&fit(["small.hdf5", "top", "1"], "run", 4, &["--resume"]));
+    assert!(error.contains("another `task`"), "{error}");
     // The same data sets in a file with another hash.
     let mut other = bench.bytes("small.hdf5");
     other.extend(b"\0");

@@ -114,6 +114,49 @@ fn a_task_of_the_users_own_is_trained_and_exported_in_any_size() {
     assert!(error.contains("trained for toy and not for ball-run"), "{error}");
 }
 
+/// A run's own configuration starts the same run again; `--set` and flags go on top of it.
+#[test]
+fn a_run_is_repeated_from_its_configuration() {
+    let bench = Bench::new();
+    bench.success(&toy("run", 3, &["--set", "eta=0.5"]));
+    let again = ["fit", "--config", "run/config.toml", "--out"];
+    bench.success(&[&again[..], &["again"]].concat());
+    for file in ["config.toml", "checkpoint.postcard", "metrics.csv"] {
+        assert_eq!(bench.bytes(&format!("again/{file}")), bench.bytes(&format!("run/{file}")), "{file}");
+    }
+    bench.success(&[&again[..], &["other", "--set", "eta=0.25", "--set", "steps=9", "--steps", "2"]].concat());
+    let config = text(&bench.bytes("other/config.toml"));
+    for line in ["preset = \"paper\"", "hidden = 8", "eta = 0.25", "steps = 2", "limit = 1.0"] {
+        assert!(config.lines().any(|other| other == line), "{line} in {config}");
+    }
+}
+
+#[test]
+fn the_options_are_listed_with_their_meaning() {
+    let bench = Bench::new();
+    let plain = bench.success(&["options"]);
+    fits_a_terminal(&plain);
+    assert!(text(&plain.stdout).contains("\n  batch = 512 (paper), 256 (quick)\n"));
+    let listed = bench.json(&["options"]);
+    bench.success(&toy("run", 1, &[]));
+    let config: toml::Table = text(&bench.bytes("run/config.toml")).parse().unwrap();
+    let keys: Vec<&str> = listed["options"].as_array().unwrap().iter().map(|o| o["key"].as_str().unwrap()).collect();
+    assert_eq!(keys.len(), config.len());
+    assert!(config.keys().all(|key| keys.contains(&key.as_str())));
+}
+
+#[test]
+fn a_run_is_drawn_as_one_page() {
+    let bench = Bench::new();
+    bench.success(&toy("run", 200, &[]));
+    let report = bench.success(&["report", "run", "-o", "page.html"]);
+    fits_a_terminal(&report);
+    let page = text(&bench.bytes("page.html"));
+    assert!(page.starts_with("<!doctype html>") && page.trim_end().ends_with("</html>"));
+    assert!(page.contains("<svg") && !page.contains("http"), "it draws, and asks nobody");
+    assert!(bench.failure(&["report", "nowhere", "-o", "page.html"]).contains("nowhere"));
+}
+
 #[test]
 fn a_run_finds_its_data_where_it_was_moved_to() {
     let bench = Bench::new();
@@ -140,6 +183,8 @@ fn help_fits_a_terminal() {
         &["data", "check"],
         &["data", "calibrate"],
         &["fit"],
+        &["options"],
+        &["report"],
         &["export"],
         &["evaluate"],
     ] {
