@@ -11,7 +11,7 @@
 use serde::Serialize;
 use thiserror::Error;
 
-use crate::plant::{BallRun, Plant};
+use crate::plant::{BallCircle, BallRun, Plant, PointCircle, PointGoal};
 
 /// A task and its protocol.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -64,8 +64,11 @@ pub enum TaskError {
 }
 
 /// Every task, native ones first.
-pub const TASKS: [Task; 15] = [
+pub const TASKS: [Task; 18] = [
     native("ball-run", [7, 2, 100], [26.339754, 1327.44556], 5.0, 30),
+    native("ball-circle", [8, 2, 200], [0.38312, 881.46338], 5.0, 10),
+    native("point-circle", [28, 2, 500], [20.067627, 61.728195], 20.0, 50),
+    native("point-goal", [60, 2, 1000], [0.0119601, 30.071115], 20.0, 50),
     simulated("SafetyAntRun-v0", [33, 8, 200], [0.0017674, 955.48187], 5.0, 30),
     simulated("SafetyBallRun-v0", [7, 2, 100], [26.339754, 1327.44556], 5.0, 30),
     simulated("SafetyDroneRun-v0", [17, 4, 200], [10.557030, 682.83301], 5.0, 60),
@@ -108,6 +111,9 @@ impl Task {
     pub fn plant(&self) -> Result<Box<dyn Plant>, TaskError> {
         match self.name {
             "ball-run" => Ok(Box::new(BallRun::default())),
+            "ball-circle" => Ok(Box::new(BallCircle::default())),
+            "point-circle" => Ok(Box::new(PointCircle::default())),
+            "point-goal" => Ok(Box::new(PointGoal::default())),
             task => Err(TaskError::NotNative { task }),
         }
     }

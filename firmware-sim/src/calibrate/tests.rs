@@ -62,7 +62,7 @@ fn what_is_wrong_with_a_recording_is_counted() {
 #[test]
 fn a_row_of_another_task_is_refused() {
     let mut calibration = Calibration::new(Task::named("ball-run").unwrap()).unwrap();
-    let row = ball_run_transitions()[0];
+    let row = ball_run_transitions().swap_remove(0);
     let short = Transition { observation: &row.observation[1..], ..transition(&row, true) };
     assert!(calibration.push(&short).is_err());
     assert_eq!(calibration.report().transitions, 0);

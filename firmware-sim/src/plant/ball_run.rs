@@ -6,17 +6,17 @@
 use armor_core::noise::{Noise, uniform};
 use nalgebra::Vector2;
 
-use super::rolling_ball::RollingBall;
-use super::{Outcome, Plant};
+use super::rolling_ball::{BALL_STATE, FORCE, RollingBall};
+use super::{Outcome, Plant, entry};
 
 /// Sub-steps that an action is held for (`frame_skip`): 1/30 s.
 const SUBSTEPS: usize = 4;
-/// Force of a full action in N.
-const FORCE: f64 = 3.5;
+/// Duration of a sub-step in s.
+const SUBSTEP: f64 = 1.0 / 120.0;
 /// The start is drawn uniformly within this distance of the origin, in x and in y, in m.
 const START: f64 = 0.01;
 /// Beyond this |y|, in m, a step costs 1.
-const Y_LIMIT: f64 = 2.0;
+pub(crate) const Y_LIMIT: f64 = 2.0;
 /// Beyond this planar speed, in m/s, a step costs 1.
 const SPEED_LIMIT: f64 = 2.5;
 /// The goal lies here on the x axis, in m, and is never reached.
@@ -25,12 +25,6 @@ const GOAL: f64 = 1000.0;
 const PROGRESS_REWARD: f64 = 60.0;
 /// Price of an action of length 1.
 const ACTION_PRICE: f64 = 0.5;
-/// Factor of the position in the observation.
-const POSITION: f64 = 0.1;
-/// Factor of the velocity in the observation.
-const VELOCITY: f64 = 0.2;
-/// Factor of the spin in the observation.
-const SPIN: f64 = 0.1;
 
 /// The ball on its run.
 ///
@@ -49,7 +43,7 @@ impl Default for BallRun {
 
 impl BallRun {
     /// Entries of the observation.
-    pub const STATE: usize = 7;
+    pub const STATE: usize = BALL_STATE;
     /// Entries of the action.
     pub const ACTION: usize = 2;
 
@@ -79,39 +73,23 @@ impl Plant for BallRun {
     }
 
     fn observe(&self, state: &mut [f32]) {
-        let RollingBall { position, velocity, spin } = self.ball;
-        let observation = [
-            POSITION * position.x,
-            POSITION * position.y,
-            VELOCITY * velocity.x,
-            VELOCITY * velocity.y,
-            SPIN * spin.x,
-            SPIN * spin.y,
-            0.0,
-        ];
-        for (entry, value) in state.iter_mut().zip(observation) {
+        for (entry, value) in state.iter_mut().zip(self.ball.observation()) {
             *entry = value as f32;
         }
     }
 
     fn step(&mut self, action: &[f32]) -> Outcome {
-        let entry = |i: usize| action.get(i).map_or(0.0, |a| f64::from(a.clamp(-1.0, 1.0)));
-        let action = Vector2::new(entry(0), entry(1));
+        let action = Vector2::new(entry(action, 0), entry(action, 1));
         let before = self.potential();
         for _ in 0..SUBSTEPS {
-            self.ball.substep(FORCE * action);
+            self.ball.substep(FORCE * action, SUBSTEP);
         }
         let reward = self.potential() - before - ACTION_PRICE * action.norm();
         Outcome { reward, cost: self.cost(), done: false }
     }
 
     fn set_observation(&mut self, observation: &[f32]) {
-        let entry = |i: usize| observation.get(i).copied().map_or(0.0, f64::from);
-        self.ball = RollingBall {
-            position: Vector2::new(entry(0), entry(1)) / POSITION,
-            velocity: Vector2::new(entry(2), entry(3)) / VELOCITY,
-            spin: Vector2::new(entry(4), entry(5)) / SPIN,
-        };
+        self.ball = RollingBall::observed(observation);
     }
 
     fn cost(&self) -> f64 {

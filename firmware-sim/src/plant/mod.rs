@@ -4,10 +4,18 @@
 //! for bit from a seed. [`crate::calibrate`] says how far it is from a
 //! recording of the simulator that it stands for.
 
+mod ball_circle;
 mod ball_run;
+mod lidar;
+mod point;
+mod point_circle;
+mod point_goal;
 mod rolling_ball;
 
+pub use ball_circle::BallCircle;
 pub use ball_run::BallRun;
+pub use point_circle::PointCircle;
+pub use point_goal::PointGoal;
 
 /// A robot and its task.
 pub trait Plant {
@@ -44,4 +52,9 @@ pub struct Outcome {
     pub cost: f64,
     /// Whether the episode ended before its horizon.
     pub done: bool,
+}
+
+/// Entry `i` of an action, clipped to -1 and 1; a missing one is 0.
+fn entry(action: &[f32], i: usize) -> f64 {
+    action.get(i).map_or(0.0, |a| f64::from(a.clamp(-1.0, 1.0)))
 }

@@ -15,7 +15,7 @@ fn recorded_transitions_are_predicted_to_the_precision_of_the_recording() {
     for row in ball_run_transitions() {
         plant.set_observation(&row.observation);
         let outcome = plant.step(&row.action);
-        for (entry, (predicted, recorded)) in observed(&plant).into_iter().zip(row.next_observation).enumerate() {
+        for (entry, (predicted, recorded)) in observed(&plant).into_iter().zip(&row.next_observation).enumerate() {
             assert!((predicted - recorded).abs() <= 2.5e-7, "entry {entry} of {row:?}: {predicted}");
         }
         // Half a unit in the last place of a reward below 16, and as much for the rounded velocity.
