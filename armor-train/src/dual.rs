@@ -2,15 +2,41 @@
 //! remaining budget, raised where the predicted cost exceeds it.
 
 use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
 
 use crate::nn::{Activation, Mlp, Scalar, Tape};
 
-/// `log lambda` is clipped to this range (Appendix B); outside it the gradient is zero.
-pub const LOG_RANGE: [f64; 2] = [-20.0, 5.0];
+/// What the clip of `log lambda` passes back (O-16).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum DualClip {
+    /// No gradient outside the range: what `exp(clip(z))` says.
+    ZeroGradient,
+    /// The gradient as if it were not there, so that lambda can come back.
+    StraightThrough,
+}
+
+/// Choices of the dual variable (O-16); the default is the paper's.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DualOptions {
+    /// `log lambda` is clipped to this range (Appendix B).
+    pub log_range: [f64; 2],
+    /// What the clip passes back.
+    pub clip: DualClip,
+    /// Whether the last layer starts at 0, and so lambda at 1.
+    pub starts_at_one: bool,
+}
+
+impl Default for DualOptions {
+    fn default() -> Self {
+        Self { log_range: [-20.0, 5.0], clip: DualClip::ZeroGradient, starts_at_one: false }
+    }
+}
 
 /// Layout of the dual network: `lambda(kappa) = exp(clip(z(scale kappa), -20, 5))`.
 #[derive(Clone, Debug)]
 pub struct Dual {
+    options: DualOptions,
     kappa_scale: f64,
     network: Mlp,
 }
@@ -26,8 +52,8 @@ pub struct DualTape<T: Scalar> {
 
 impl Dual {
     /// Two hidden layers of `hidden` units with ReLU; the network sees `kappa_scale * kappa`.
-    pub fn new(hidden: usize, kappa_scale: f64) -> Self {
-        Self { kappa_scale, network: Mlp::new(&[1, hidden, hidden, 1], 0, Activation::Relu, None) }
+    pub fn new(options: DualOptions, hidden: usize, kappa_scale: f64) -> Self {
+        Self { options, kappa_scale, network: Mlp::new(&[1, hidden, hidden, 1], 0, Activation::Relu, None) }
     }
 
     /// Numbers of the network.
@@ -38,6 +64,9 @@ impl Dual {
     /// PyTorch's default initialisation from draws in `[0, 1)`.
     pub fn initialise<T: Scalar>(&self, parameters: &mut [T], draws: &mut impl Iterator<Item = f64>) {
         self.network.initialise(parameters, draws);
+        if let (true, Some(last)) = (self.options.starts_at_one, self.network.layers().last()) {
+            parameters[last.offset..last.end()].fill(T::zero());
+        }
     }
 
     /// Room for passes over `samples` budgets.
@@ -56,7 +85,7 @@ impl Dual {
             *input = scale * kappa;
         }
         self.network.forward(parameters, &tape.input, &mut tape.network, true);
-        let [low, high] = LOG_RANGE.map(T::of);
+        let [low, high] = self.options.log_range.map(T::of);
         for (lambda, &log) in tape.lambda.iter_mut().zip(tape.network.output()) {
             *lambda = log.max(low).min(high).exp();
         }
@@ -73,14 +102,14 @@ impl Dual {
         tape: &mut DualTape<T>,
         gradient: &mut [T],
     ) -> f64 {
-        let [low, high] = LOG_RANGE.map(T::of);
+        let [low, high] = self.options.log_range.map(T::of);
         let share = T::of(1.0 / batch as f64);
         let mut loss = 0.0;
         for (sample, (&lambda, &violation)) in tape.lambda.iter().zip(violation).enumerate() {
             loss -= (lambda * violation).to_f64();
             let log = tape.network.output()[sample];
-            let inside = log >= low && log <= high;
-            tape.network.output_gradient()[sample] = if inside { -lambda * violation * share } else { T::zero() };
+            let passes = self.options.clip == DualClip::StraightThrough || log >= low && log <= high;
+            tape.network.output_gradient()[sample] = if passes { -lambda * violation * share } else { T::zero() };
         }
         self.network.backward(parameters, &tape.input, &mut tape.network, Some(gradient), None);
         loss
@@ -97,7 +126,7 @@ mod tests {
 
     #[test]
     fn gradient_is_that_of_finite_differences() {
-        let dual = Dual::new(6, 0.1);
+        let dual = Dual::new(DualOptions::default(), 6, 0.1);
         let parameters = fill(dual.size(), 1);
         let violation = fill(4, 2);
         let loss = |parameters: &[f64]| {
@@ -113,7 +142,7 @@ mod tests {
     }
 
     fn after_ascent(violation: f64) -> (f64, f64) {
-        let dual = Dual::new(6, 0.1);
+        let dual = Dual::new(DualOptions::default(), 6, 0.1);
         let mut parameters = fill(dual.size(), 1);
         let mut tape = dual.tape(4);
         dual.forward(&parameters, &KAPPA, &mut tape);
@@ -138,9 +167,40 @@ mod tests {
         assert!(lowered >= (-20f64).exp());
     }
 
+    /// The gradient of the last layer's bias, which is that of `log lambda`, far outside the range.
+    fn gradient_beyond(clip: DualClip) -> f64 {
+        let dual = Dual::new(DualOptions { clip, log_range: [-1.0, 1.0], ..DualOptions::default() }, 2, 1.0);
+        let mut parameters = vec![0.0; dual.size()];
+        *parameters.last_mut().unwrap() = 3.0;
+        let (mut tape, mut gradient) = (dual.tape(1), vec![0.0; dual.size()]);
+        dual.forward(&parameters, &[3.0], &mut tape);
+        dual.backward(&parameters, &[-0.5], 1, &mut tape, &mut gradient);
+        *gradient.last().unwrap()
+    }
+
+    #[test]
+    fn only_a_straight_through_clip_lets_lambda_come_back() {
+        assert_eq!(gradient_beyond(DualClip::ZeroGradient), 0.0);
+        assert!((gradient_beyond(DualClip::StraightThrough) - 0.5 * 1f64.exp()).abs() < 1e-12);
+    }
+
+    #[test]
+    fn lambda_starts_at_one_where_asked() {
+        let lambda = |starts_at_one| {
+            let dual = Dual::new(DualOptions { starts_at_one, ..DualOptions::default() }, 4, 1.0);
+            let mut parameters = vec![0.0; dual.size()];
+            dual.initialise(&mut parameters, &mut fill(dual.size(), 1).into_iter());
+            let mut tape = dual.tape(4);
+            dual.forward(&parameters, &KAPPA, &mut tape);
+            tape.lambda
+        };
+        assert_eq!(lambda(true), [1.0; 4]);
+        assert!(lambda(false).iter().all(|lambda| *lambda != 1.0));
+    }
+
     #[test]
     fn beyond_the_clip_lambda_stays_at_its_bound() {
-        let dual = Dual::new(2, 1.0);
+        let dual = Dual::new(DualOptions::default(), 2, 1.0);
         let mut parameters = vec![0.0; dual.size()];
         for (bias, bound) in [(-30.0, (-20f64).exp()), (9.0, 148.413_159_102_576_6)] {
             *parameters.last_mut().unwrap() = bias;

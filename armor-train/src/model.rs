@@ -8,7 +8,7 @@ use crate::actor::Actor;
 use crate::actor::denoiser::{Denoiser, Widths};
 use crate::config::Config;
 use crate::critic::{Critic, CriticOptions, Trunk};
-use crate::dual::Dual;
+use crate::dual::{Dual, DualOptions};
 use crate::nn::{Adam, Scalar};
 use crate::pcgrad::{Order, Pooling};
 use crate::stream;
@@ -22,6 +22,8 @@ pub struct Model {
     pub critic: Critic,
     /// The dual variable.
     pub dual: Dual,
+    /// Factor on the squared norm of the dual's weights in its loss.
+    pub dual_decay: f64,
     /// Chain that samples the next action of the targets.
     pub target_chain: Vec<ChainStep<f64>>,
     /// Discounts of reward, long-term and short-term cost.
@@ -80,7 +82,10 @@ impl Model {
                 denoiser: Denoiser::new(widths, config.kappa_scale),
                 schedule,
                 policy_gradient: config.policy_gradient,
+                gradient_steps: config.gradient_steps,
+                cloning_norm: config.cloning_norm,
                 eta: config.eta,
+                guidance: config.guidance,
                 constraint_scale: if config.dual_normalize { 1.0 / (config.limit * config.cost_scale) } else { 1.0 },
             },
             critic: Critic::with_options(
@@ -94,7 +99,16 @@ impl Model {
                 [state, action, config.trunk, config.head],
                 config.kappa_scale,
             ),
-            dual: Dual::new(config.dual_hidden, config.kappa_scale),
+            dual: Dual::new(
+                DualOptions {
+                    log_range: [config.log_lambda_min, config.log_lambda_max],
+                    clip: config.dual_clip,
+                    starts_at_one: config.dual_zero_start,
+                },
+                config.dual_hidden,
+                config.kappa_scale,
+            ),
+            dual_decay: config.dual_decay,
             target_chain: schedule.chain(config.target_sampler, config.target_steps).collect(),
             gradient_clip: config.gradient_clip,
             pcgrad: config.pcgrad,

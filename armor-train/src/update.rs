@@ -62,7 +62,7 @@ impl<T: Scalar> Worker<T> {
             levels: vec![1; samples],
             cloning: DMatrix::zeros(action, samples),
             next_context: denoiser.context(samples),
-            next_chain: Chain::new(denoiser, model.target_chain.clone(), samples, false),
+            next_chain: Chain::new(denoiser, model.target_chain.clone(), samples, 0),
             target_tape: model.critic.tape(samples),
             critic_tape: model.critic.tape(samples),
             targets: Vec::with_capacity(samples),
@@ -116,23 +116,33 @@ impl<T: Scalar> Worker<T> {
         }
     }
 
-    /// Eqs. 13, 15 and 16: the gradients of actor and dual.
-    fn improve(&mut self, model: &Model, parameters: &Parameters<T>, batch_len: usize, draw: &Draw<'_, T>) {
+    /// The terms of Eqs. 13, 15 and 16.
+    fn act(&mut self, model: &Model, parameters: &Parameters<T>, batch_len: usize, draw: &Draw<'_, T>) {
         let first = self.first;
         let draw = |stage: usize, sample: usize, out: &mut [T]| draw(stage, first + sample, out);
+        let noise = ActorNoise { levels: &self.levels, cloning: &self.cloning, chain: &draw };
+        let (judges, batch) = (judges(model, parameters), (&self.batch, batch_len));
+        self.actor_loss = model.actor.forward(&parameters.actor, judges, batch, &noise, &mut self.actor_tape);
+    }
+
+    /// The gradients of actor and dual, with the factor `guidance` on `Q_r`.
+    fn improve(&mut self, model: &Model, parameters: &Parameters<T>, batch_len: usize, guidance: f64) {
         self.actor_gradient.fill(T::zero());
         self.dual_gradient.fill(T::zero());
-        let judges = Judges { critic: (&model.critic, &parameters.critic), dual: (&model.dual, &parameters.dual) };
-        let noise = ActorNoise { levels: &self.levels, cloning: &self.cloning, chain: &draw };
-        self.actor_loss = model.actor.backward(
+        model.actor.backward(
             &parameters.actor,
-            judges,
+            judges(model, parameters),
             (&self.batch, batch_len),
-            &noise,
+            guidance,
             &mut self.actor_tape,
             (&mut self.actor_gradient, &mut self.dual_gradient),
         );
     }
+}
+
+/// The networks that judge the actor.
+fn judges<'a, T: Scalar>(model: &'a Model, parameters: &'a Parameters<T>) -> Judges<'a, T> {
+    Judges { critic: (&model.critic, &parameters.critic), dual: (&model.dual, &parameters.dual) }
 }
 
 /// Updates the critic: Eqs. 3 and 4 in every share, Eq. 5 on the trunk, one step of Adam.
@@ -183,24 +193,29 @@ pub fn update_actor<T: Scalar>(
 ) -> (ActorLoss, [Vec<T>; 2]) {
     let batch_len = workers.iter().map(|worker| worker.batch.samples()).sum();
     let shared = &*parameters;
-    workers.par_iter_mut().for_each(|worker| worker.improve(model, shared, batch_len, draw));
+    workers.par_iter_mut().for_each(|worker| worker.act(model, shared, batch_len, draw));
+    let loss = workers.iter().fold(ActorLoss::default(), |sum, worker| sum + worker.actor_loss);
+    let loss = loss * (1.0 / batch_len as f64);
+    let guidance = model.actor.guidance.factor(model.actor.eta, loss.reward_size);
+    workers.par_iter_mut().for_each(|worker| worker.improve(model, shared, batch_len, guidance));
 
     let mut gradient = vec![T::zero(); parameters.actor.len()];
-    let mut dual_gradient = vec![T::zero(); parameters.dual.len()];
-    let mut sum = ActorLoss::default();
+    let mut dual_gradient: Vec<T> = parameters.dual.iter().map(|&p| T::of(2.0 * model.dual_decay) * p).collect();
     for worker in workers {
         accumulate(&mut gradient, &worker.actor_gradient);
         accumulate(&mut dual_gradient, &worker.dual_gradient);
-        sum = sum + worker.actor_loss;
     }
     clip_norm(&mut gradient, model.gradient_clip);
     clip_norm(&mut dual_gradient, model.gradient_clip);
     optimisers.actor.descend(&mut parameters.actor, &gradient);
     optimisers.dual.descend(&mut parameters.dual, &dual_gradient);
-    (sum * (1.0 / batch_len as f64), [gradient, dual_gradient])
+    (loss, [gradient, dual_gradient])
 }
 
 /// Moves the target critic towards the critic (Appendix B).
 pub fn update_target<T: Scalar>(parameters: &mut Parameters<T>, rate: f64) {
     soft_update(&mut parameters.target, &parameters.critic, T::of(rate));
 }
+
+#[cfg(test)]
+mod tests;

@@ -5,9 +5,9 @@
 use armor_core::schedule::{Sampler, VpSchedule};
 use armor_train::actor::chain::Chain;
 use armor_train::actor::denoiser::{Denoiser, Widths};
-use armor_train::actor::{Actor, PolicyGradient};
+use armor_train::actor::{Actor, CloningNorm, Guidance, PolicyGradient};
 use armor_train::critic::{Critic, Task};
-use armor_train::dual::Dual;
+use armor_train::dual::{Dual, DualOptions};
 use armor_train::model::{Model, Optimisers, Parameters};
 use armor_train::nn::Adam;
 use armor_train::pcgrad::{Order, Pooling};
@@ -74,11 +74,15 @@ impl Reference {
                 denoiser: Denoiser::new(widths, kappa_scale),
                 schedule,
                 policy_gradient,
+                gradient_steps: 0,
+                cloning_norm: CloningNorm::Sum,
                 eta: 1.0,
+                guidance: Guidance::Raw,
                 constraint_scale: 1.0,
             },
             critic: Critic::new(STATE, ACTION, 12, 10, kappa_scale),
-            dual: Dual::new(9, kappa_scale),
+            dual: Dual::new(DualOptions::default(), 9, kappa_scale),
+            dual_decay: 0.0,
             target_chain: schedule.chain(Sampler::Ddpm, STEPS).collect(),
             discounts: [0.99, 0.99, 0.3],
             gradient_clip: 0.0,
@@ -161,8 +165,8 @@ impl Reference {
         let actions: Vec<f64> = workers.iter().flat_map(|worker| worker.policy_action().iter().copied()).collect();
         assert!((loss.cloning - self.number("l_bc")).abs() < 1e-9);
         let name = match policy_gradient {
-            PolicyGradient::Full => "full",
             PolicyGradient::OneStep => "one_step",
+            PolicyGradient::Full | PolicyGradient::LastK => "full",
         };
         self.expect(&format!("{name}_a_pi"), &actions);
         assert!((total - self.number(&format!("{name}_loss"))).abs() < 1e-9);
@@ -286,7 +290,7 @@ fn a_short_deterministic_chain_has_pytorchs_actions() {
     let mut context = actor.denoiser.context(SAMPLES);
     let (state, kappa) = (reference.matrix("s", STATE), reference.numbers("kappa"));
     actor.denoiser.prepare(&parameters, &state, &kappa, &mut context);
-    let mut chain = Chain::new(&actor.denoiser, steps, SAMPLES, false);
+    let mut chain = Chain::new(&actor.denoiser, steps, SAMPLES, 0);
     let draw = reference.draws("pi_start_noise", "pi_step_noise");
     chain.run(&actor.denoiser, &parameters, &context, &draw);
     reference.expect("ddim_a", chain.action.as_slice());

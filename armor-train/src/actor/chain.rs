@@ -16,6 +16,8 @@ pub type Draw<'a, T> = dyn Fn(usize, usize, &mut [T]) + Sync + 'a;
 #[derive(Clone, Debug)]
 pub struct Chain<T: Scalar> {
     steps: Vec<ChainStep<f64>>,
+    /// Steps at the end of the chain that are remembered.
+    gradient_steps: usize,
     calls: Vec<Call<T>>,
     /// 1 where the estimate `x0` of a step lay within the bounds, 0 where it was clipped.
     inside: Vec<DMatrix<T>>,
@@ -24,13 +26,16 @@ pub struct Chain<T: Scalar> {
 }
 
 impl<T: Scalar> Chain<T> {
-    /// Room for the given steps on `samples` columns; with `gradient`, room for every call of the network.
-    pub fn new(denoiser: &Denoiser, steps: Vec<ChainStep<f64>>, samples: usize, gradient: bool) -> Self {
-        let remembered = if gradient { steps.len() } else { 1 };
+    /// Room for the given steps on `samples` columns, and for the calls of the last
+    /// `gradient_steps` of them, through which a gradient shall flow.
+    pub fn new(denoiser: &Denoiser, steps: Vec<ChainStep<f64>>, samples: usize, gradient_steps: usize) -> Self {
+        let gradient_steps = gradient_steps.min(steps.len());
+        let room = gradient_steps.max(1);
         let action = DMatrix::zeros(denoiser.widths().action, samples);
         Self {
-            calls: (0..remembered).map(|_| denoiser.call(samples)).collect(),
-            inside: vec![action.clone(); remembered],
+            calls: (0..room).map(|_| denoiser.call(samples)).collect(),
+            inside: vec![action.clone(); room],
+            gradient_steps,
             steps,
             action,
         }
@@ -42,7 +47,7 @@ impl<T: Scalar> Chain<T> {
     /// the network at that step: its part of the call is not kept.
     pub fn run(&mut self, denoiser: &Denoiser, parameters: &[T], context: &Context<T>, draw: &Draw<'_, T>) {
         let rows = self.action.nrows();
-        let gradient = self.calls.len() == self.steps.len();
+        let forgotten = self.steps.len() - self.gradient_steps;
         let mut noise = vec![T::zero(); rows];
         let mut kept = Vec::with_capacity(self.action.ncols());
         for (sample, mut column) in self.action.column_iter_mut().enumerate() {
@@ -50,7 +55,8 @@ impl<T: Scalar> Chain<T> {
             column.copy_from_slice(&noise);
         }
         for (index, step) in self.steps.iter().enumerate() {
-            let slot = if gradient { index } else { 0 };
+            let gradient = index >= forgotten;
+            let slot = index.saturating_sub(forgotten);
             let call = &mut self.calls[slot];
             call.action.copy_from(&self.action);
             call.levels.fill(step.n);
@@ -82,7 +88,7 @@ impl<T: Scalar> Chain<T> {
     }
 
     /// Back-propagates `action_gradient`, `A x B`, with respect to the end of
-    /// the last run; adds to `gradient` and to the gradients in `context`.
+    /// the last run, through the remembered steps; adds to `gradient` and to the gradients in `context`.
     pub fn backward(
         &mut self,
         denoiser: &Denoiser,
@@ -92,7 +98,8 @@ impl<T: Scalar> Chain<T> {
         gradient: &mut [T],
     ) {
         let mut after = action_gradient.clone();
-        for ((step, call), inside) in self.steps.iter().zip(&mut self.calls).zip(&self.inside).rev() {
+        let remembered = &self.steps[self.steps.len() - self.gradient_steps..];
+        for ((step, call), inside) in remembered.iter().zip(&mut self.calls).zip(&self.inside).rev() {
             let [from_action, from_noise, to_x0, to_action, _] = coefficients::<T>(step);
             // The gradient with respect to the estimate; a clipped entry passes none.
             let estimate = after.component_mul(inside) * to_x0;

@@ -7,6 +7,7 @@
 
 pub mod chain;
 pub mod denoiser;
+mod guidance;
 
 use armor_core::schedule::{Sampler, VpSchedule};
 use nalgebra::DMatrix;
@@ -19,12 +20,16 @@ use crate::nn::Scalar;
 use chain::{Chain, Draw, clip, coefficients};
 use denoiser::{Call, Context, Denoiser};
 
+pub use guidance::{CloningNorm, Guidance};
+
 /// Where the action `a_pi` of the policy improvement comes from, and how its gradient flows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PolicyGradient {
     /// A sample of the full chain, with the gradient through all its steps (the paper).
     Full,
+    /// The same sample, with the gradient through its last steps alone.
+    LastK,
     /// The estimate `x0` from the noised data action of `L_BC`: no further call of the network.
     OneStep,
 }
@@ -38,8 +43,14 @@ pub struct Actor {
     pub schedule: VpSchedule,
     /// How the policy improvement differentiates.
     pub policy_gradient: PolicyGradient,
+    /// Steps of [`PolicyGradient::LastK`].
+    pub gradient_steps: usize,
+    /// How the error of behaviour cloning is summed.
+    pub cloning_norm: CloningNorm,
     /// Reward guidance coefficient, eta of Eq. 14.
     pub eta: f64,
+    /// What eta counts in.
+    pub guidance: Guidance,
     /// Factor on the violation of the constraint; 1 in the paper.
     pub constraint_scale: f64,
 }
@@ -68,6 +79,8 @@ pub struct ActorLoss {
     pub cloning: f64,
     /// `Q_r(s, kappa, a_pi)`.
     pub reward: f64,
+    /// `|Q_r(s, kappa, a_pi)|`.
+    pub reward_size: f64,
     /// `Q_cL(s, kappa, a_pi)`.
     pub long_cost: f64,
     /// `lambda(kappa) (Q_cL - kappa)`, the negative of Eq. 16.
@@ -82,6 +95,7 @@ impl std::ops::Add for ActorLoss {
         Self {
             cloning: self.cloning + other.cloning,
             reward: self.reward + other.reward,
+            reward_size: self.reward_size + other.reward_size,
             long_cost: self.long_cost + other.long_cost,
             penalty: self.penalty + other.penalty,
             lambda: self.lambda + other.lambda,
@@ -95,6 +109,7 @@ impl std::ops::Mul<f64> for ActorLoss {
         Self {
             cloning: self.cloning * factor,
             reward: self.reward * factor,
+            reward_size: self.reward_size * factor,
             long_cost: self.long_cost * factor,
             penalty: self.penalty * factor,
             lambda: self.lambda * factor,
@@ -132,14 +147,20 @@ impl Actor {
     /// Room for updates on `samples` columns.
     pub fn tape<T: Scalar>(&self, critic: &Critic, dual: &Dual, samples: usize) -> ActorTape<T> {
         let steps: Vec<_> = match self.policy_gradient {
-            PolicyGradient::Full => self.schedule.chain(Sampler::Ddpm, self.schedule.steps).collect(),
+            PolicyGradient::Full | PolicyGradient::LastK => {
+                self.schedule.chain(Sampler::Ddpm, self.schedule.steps).collect()
+            }
             PolicyGradient::OneStep => Vec::new(),
+        };
+        let gradient_steps = match self.policy_gradient {
+            PolicyGradient::LastK => self.gradient_steps,
+            PolicyGradient::Full | PolicyGradient::OneStep => steps.len(),
         };
         let action = || DMatrix::zeros(self.denoiser.widths().action, samples);
         ActorTape {
             context: self.denoiser.context(samples),
             call: self.denoiser.call(samples),
-            chain: Chain::new(&self.denoiser, steps, samples, true),
+            chain: Chain::new(&self.denoiser, steps, samples, gradient_steps),
             inside: action(),
             critic: critic.tape(samples),
             dual: dual.tape(samples),
@@ -149,21 +170,19 @@ impl Actor {
         }
     }
 
-    /// The gradients of `L_phi` (Eq. 15) and of `L_lambda` (Eq. 16), added to
-    /// `gradient` and `dual_gradient`; means are over `batch_len` samples, of which
-    /// `batch` is a share.
-    pub fn backward<T: Scalar>(
+    /// The terms of `L_phi` (Eq. 15) and `L_lambda` (Eq. 16), summed over `batch`, a
+    /// share of `batch_len` samples; [`Actor::backward`] may follow.
+    pub fn forward<T: Scalar>(
         &self,
         parameters: &[T],
         judges: Judges<'_, T>,
         (batch, batch_len): (&Batch<T>, usize),
         noise: &ActorNoise<'_, T>,
         tape: &mut ActorTape<T>,
-        (gradient, dual_gradient): (&mut [T], &mut [T]),
     ) -> ActorLoss {
         let share = T::of(1.0 / batch_len as f64);
         self.denoiser.prepare(parameters, &batch.state, &batch.kappa, &mut tape.context);
-        let cloning = self.clone_behaviour(parameters, batch, share, noise, tape);
+        let cloning = self.clone_behaviour(parameters, batch, share, (noise.levels, noise.cloning), tape);
         self.sample(parameters, noise, tape);
 
         let (critic, critic_parameters) = judges.critic;
@@ -175,28 +194,45 @@ impl Actor {
         for (violation, (q, &threshold)) in tape.violation.iter_mut().zip(pairs) {
             *violation = scale * (q - threshold);
         }
-        let sum = |task| tape.critic.pessimistic(task).map(T::to_f64).sum();
-        let (reward, long_cost) = (sum(Task::Reward), sum(Task::LongCost));
-
         let (dual, dual_parameters) = judges.dual;
         dual.forward(dual_parameters, &batch.kappa, &mut tape.dual);
-        let dual_loss = dual.backward(dual_parameters, &tape.violation, batch_len, &mut tape.dual, dual_gradient);
 
-        let reward_slope = vec![-T::of(self.eta) * share; batch.samples()];
+        let values = |task| tape.critic.pessimistic(task).map(T::to_f64);
+        let lambda = || tape.dual.lambda.iter().map(|lambda| lambda.to_f64());
+        ActorLoss {
+            cloning,
+            reward: values(Task::Reward).sum(),
+            reward_size: values(Task::Reward).map(f64::abs).sum(),
+            long_cost: values(Task::LongCost).sum(),
+            penalty: lambda().zip(&tape.violation).map(|(lambda, violation)| lambda * violation.to_f64()).sum(),
+            lambda: lambda().sum(),
+        }
+    }
+
+    /// The gradients of `L_phi` and `L_lambda` after [`Actor::forward`], added to `gradient`
+    /// and `dual_gradient`, with the factor `guidance` on `Q_r`; means are over `batch_len` samples.
+    pub fn backward<T: Scalar>(
+        &self,
+        parameters: &[T],
+        judges: Judges<'_, T>,
+        (batch, batch_len): (&Batch<T>, usize),
+        guidance: f64,
+        tape: &mut ActorTape<T>,
+        (gradient, dual_gradient): (&mut [T], &mut [T]),
+    ) {
+        let share = T::of(1.0 / batch_len as f64);
+        let ((critic, critic_parameters), (dual, dual_parameters)) = (judges.critic, judges.dual);
+        dual.backward(dual_parameters, &tape.violation, batch_len, &mut tape.dual, dual_gradient);
+
+        let scale = T::of(self.constraint_scale);
+        let reward_slope = vec![-T::of(guidance) * share; batch.samples()];
         let cost_slope: Vec<T> = tape.dual.lambda.iter().map(|&lambda| lambda * scale * share).collect();
         let slopes = [(Task::Reward, &reward_slope[..]), (Task::LongCost, &cost_slope[..])];
         critic.action_gradient(critic_parameters, &slopes, &mut tape.critic, &mut tape.action_gradient);
 
-        self.improve(parameters, noise, tape, gradient);
+        self.improve(parameters, tape, gradient);
         self.denoiser.backward(parameters, &mut tape.context, &mut tape.call, gradient);
         self.denoiser.finish(parameters, &batch.state, &mut tape.context, gradient);
-        ActorLoss {
-            cloning,
-            reward,
-            long_cost,
-            penalty: -dual_loss,
-            lambda: tape.dual.lambda.iter().map(|lambda| lambda.to_f64()).sum(),
-        }
     }
 
     /// Eqs. 11 and 13: noises the recorded actions, predicts the noise, and sets
@@ -206,23 +242,24 @@ impl Actor {
         parameters: &[T],
         batch: &Batch<T>,
         share: T,
-        noise: &ActorNoise<'_, T>,
+        (levels, noise): (&[usize], &DMatrix<T>),
         tape: &mut ActorTape<T>,
     ) -> f64 {
         let call = &mut tape.call;
-        call.levels.copy_from_slice(noise.levels);
-        for (sample, &level) in noise.levels.iter().enumerate() {
+        let norm = T::of(self.cloning_norm.factor(batch.action.nrows()));
+        call.levels.copy_from_slice(levels);
+        for (sample, &level) in levels.iter().enumerate() {
             let alpha_bar = self.schedule.alpha_bar(level);
             let (signal, spread) = (T::of(alpha_bar.sqrt()), T::of((1.0 - alpha_bar).sqrt()));
-            let noised = batch.action.column(sample) * signal + noise.cloning.column(sample) * spread;
+            let noised = batch.action.column(sample) * signal + noise.column(sample) * spread;
             call.action.set_column(sample, &noised);
         }
         self.denoiser.forward(parameters, &tape.context, call, true);
         let mut loss = 0.0;
         for (sample, &weight) in batch.weight.iter().enumerate() {
-            let error = call.noise().column(sample) - noise.cloning.column(sample);
-            loss += (weight * error.norm_squared()).to_f64();
-            call.noise_gradient().set_column(sample, &(error * (T::of(2.0) * weight * share)));
+            let error = call.noise().column(sample) - noise.column(sample);
+            loss += (norm * weight * error.norm_squared()).to_f64();
+            call.noise_gradient().set_column(sample, &(error * (T::of(2.0) * norm * weight * share)));
         }
         loss
     }
@@ -230,7 +267,7 @@ impl Actor {
     /// `a_pi`, by the full chain or by the one-step estimate.
     fn sample<T: Scalar>(&self, parameters: &[T], noise: &ActorNoise<'_, T>, tape: &mut ActorTape<T>) {
         match self.policy_gradient {
-            PolicyGradient::Full => {
+            PolicyGradient::Full | PolicyGradient::LastK => {
                 tape.chain.run(&self.denoiser, parameters, &tape.context, noise.chain);
                 tape.action.copy_from(&tape.chain.action);
             }
@@ -248,19 +285,15 @@ impl Actor {
     }
 
     /// Carries the critics' gradient at `a_pi` back to the network.
-    fn improve<T: Scalar>(
-        &self,
-        parameters: &[T],
-        noise: &ActorNoise<'_, T>,
-        tape: &mut ActorTape<T>,
-        gradient: &mut [T],
-    ) {
+    fn improve<T: Scalar>(&self, parameters: &[T], tape: &mut ActorTape<T>, gradient: &mut [T]) {
         let ActorTape { context, call, chain, inside, action_gradient, .. } = tape;
         match self.policy_gradient {
-            PolicyGradient::Full => chain.backward(&self.denoiser, parameters, context, action_gradient, gradient),
+            PolicyGradient::Full | PolicyGradient::LastK => {
+                chain.backward(&self.denoiser, parameters, context, action_gradient, gradient);
+            }
             PolicyGradient::OneStep => {
-                for (sample, &level) in noise.levels.iter().enumerate() {
-                    let [_, from_noise, ..] = self.estimate::<T>(level);
+                for sample in 0..inside.ncols() {
+                    let [_, from_noise, ..] = self.estimate::<T>(call.levels[sample]);
                     let through = action_gradient.column(sample).component_mul(&inside.column(sample));
                     let mut noise_gradient = call.noise_gradient().column_mut(sample);
                     noise_gradient -= through * from_noise;

@@ -5,6 +5,7 @@ use nalgebra::DMatrix;
 
 use super::denoiser::{Denoiser, Widths};
 use super::*;
+use crate::dual::DualOptions;
 use crate::testing::{assert_gradient, fill};
 
 const SAMPLES: usize = 4;
@@ -37,7 +38,7 @@ struct Fixture {
 fn fixture(policy_gradient: PolicyGradient) -> Fixture {
     let denoiser = Denoiser::new(WIDTHS, 0.5);
     let critic = Critic::new(3, 2, 6, 5, 0.5);
-    let dual = Dual::new(5, 0.5);
+    let dual = Dual::new(DualOptions::default(), 5, 0.5);
     let mut batch = Batch::zeros(3, 2, SAMPLES);
     batch.state = DMatrix::from_vec(3, SAMPLES, fill(3 * SAMPLES, 11));
     batch.action = DMatrix::from_vec(2, SAMPLES, fill(2 * SAMPLES, 12));
@@ -48,7 +49,16 @@ fn fixture(policy_gradient: PolicyGradient) -> Fixture {
         parameters: fill(denoiser.size(), 1),
         critic_parameters: fill(critic.size(), 2),
         dual_parameters: fill(dual.size(), 3),
-        actor: Actor { denoiser, schedule: VpSchedule::new(STEPS), policy_gradient, eta: 0.7, constraint_scale: 0.6 },
+        actor: Actor {
+            denoiser,
+            schedule: VpSchedule::new(STEPS),
+            policy_gradient,
+            gradient_steps: 4,
+            cloning_norm: CloningNorm::Sum,
+            eta: 0.7,
+            guidance: Guidance::Raw,
+            constraint_scale: 0.6,
+        },
         critic,
         dual,
         batch,
@@ -68,14 +78,10 @@ impl Fixture {
         let judges =
             Judges { critic: (&self.critic, &self.critic_parameters), dual: (&self.dual, &self.dual_parameters) };
         let noise = ActorNoise { levels: &LEVELS, cloning: &self.cloning, chain: &draw };
-        let loss = self.actor.backward(
-            parameters,
-            judges,
-            (&self.batch, SAMPLES),
-            &noise,
-            &mut tape,
-            (&mut gradient, &mut dual_gradient),
-        );
+        let batch = (&self.batch, SAMPLES);
+        let loss = self.actor.forward(parameters, judges, batch, &noise, &mut tape);
+        let gradients = (&mut gradient[..], &mut dual_gradient[..]);
+        self.actor.backward(parameters, judges, batch, self.actor.eta, &mut tape, gradients);
         (loss, gradient, tape)
     }
 
@@ -98,6 +104,56 @@ fn the_gradient_through_the_full_chain_and_its_clips_is_that_of_finite_differenc
 #[test]
 fn the_one_step_gradient_is_that_of_finite_differences() {
     fixture(PolicyGradient::OneStep).check();
+}
+
+/// Through all its steps a chain has a gradient of finite differences (above);
+/// one that starts where the last steps start has the gradient of those alone.
+#[test]
+fn the_last_steps_have_the_gradient_of_a_chain_that_starts_there() {
+    let f = fixture(PolicyGradient::Full);
+    let denoiser = &f.actor.denoiser;
+    let steps: Vec<_> = f.actor.schedule.chain(Sampler::Ddpm, STEPS).collect();
+    let seed = DMatrix::from_vec(2, SAMPLES, fill(2 * SAMPLES, 14));
+    let run = |steps: &[_], last: usize, draw: &Draw<'_, f64>| {
+        let mut context = denoiser.context(SAMPLES);
+        denoiser.prepare(&f.parameters, &f.batch.state, &f.batch.kappa, &mut context);
+        let mut chain = Chain::new(denoiser, steps.to_vec(), SAMPLES, last);
+        chain.run(denoiser, &f.parameters, &context, draw);
+        let mut gradient = vec![0.0; f.parameters.len()];
+        chain.backward(denoiser, &f.parameters, &mut context, &seed, &mut gradient);
+        denoiser.finish(&f.parameters, &f.batch.state, &mut context, &mut gradient);
+        (chain.action, gradient)
+    };
+    let last = f.actor.gradient_steps;
+    let (start, _) = run(&steps[..STEPS - last], 0, &draw);
+    let tail = |stage: usize, sample: usize, out: &mut [f64]| match stage {
+        0 => out.copy_from_slice(start.column(sample).as_slice()),
+        _ => draw(stage + STEPS - last, sample, out),
+    };
+    let expected = run(&steps[STEPS - last..], last, &tail);
+    let (action, gradient) = run(&steps, last, &draw);
+    assert_eq!((&action, &gradient), (&expected.0, &expected.1));
+    assert_ne!(gradient, run(&steps, STEPS, &draw).1, "the first steps have a gradient of their own");
+    assert!(gradient.iter().any(|entry| *entry != 0.0));
+}
+
+#[test]
+fn the_actor_takes_the_policy_gradient_that_it_is_told() {
+    let gradients = [PolicyGradient::Full, PolicyGradient::LastK, PolicyGradient::OneStep].map(|policy_gradient| {
+        let f = fixture(policy_gradient);
+        f.backward(&f.parameters).1
+    });
+    assert!(gradients[0] != gradients[1] && gradients[1] != gradients[2]);
+}
+
+#[test]
+fn the_mean_over_action_entries_is_the_sum_divided_by_their_number() {
+    let mut f = fixture(PolicyGradient::OneStep);
+    let (sum, ..) = f.backward(&f.parameters);
+    f.actor.cloning_norm = CloningNorm::Mean;
+    let (mean, ..) = f.backward(&f.parameters);
+    assert!((sum.cloning - 2.0 * mean.cloning).abs() < 1e-12);
+    f.check();
 }
 
 #[test]

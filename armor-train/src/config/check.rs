@@ -3,6 +3,7 @@
 use armor_core::schedule::MAX_STEPS;
 
 use super::{Config, ConfigError};
+use crate::actor::PolicyGradient;
 
 impl Config {
     /// Whether every option lies in its range.
@@ -51,6 +52,7 @@ impl Config {
         }
         let not_negative = [
             ("dual_slack", self.dual_slack),
+            ("dual_decay", self.dual_decay),
             ("gradient_clip", self.gradient_clip),
             ("counterfactual_tolerance", self.counterfactual_tolerance),
         ];
@@ -75,6 +77,15 @@ impl Config {
         )?;
         let is_code = self.time_code >= 4 && self.time_code.is_multiple_of(2) && self.time_code <= 1024;
         require("time_code", is_code, "even and between 4 and 1024")?;
+        let last_k = 1..=self.diffusion_steps;
+        let is_last_k = self.policy_gradient == PolicyGradient::LastK;
+        require(
+            "gradient_steps",
+            !is_last_k || last_k.contains(&self.gradient_steps),
+            "between 1 and diffusion_steps",
+        )?;
+        let range = self.log_lambda_min.is_finite() && self.log_lambda_min < self.log_lambda_max;
+        require("log_lambda_max", range && self.log_lambda_max <= 50.0, "above log_lambda_min and at most 50")?;
         require("head_layers", (1..=2).contains(&self.head_layers), "1 or 2")?;
         require("reweight_interval", self.reweight_interval >= 1, "at least 1")?;
         let ordered = 0.0 <= self.weight_min && self.weight_min <= self.weight_max && self.weight_max.is_finite();

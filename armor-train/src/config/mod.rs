@@ -11,8 +11,9 @@ use std::path::PathBuf;
 use armor_core::schedule::Sampler;
 use serde::{Deserialize, Serialize};
 
-use crate::actor::PolicyGradient;
+use crate::actor::{CloningNorm, Guidance, PolicyGradient};
 use crate::critic::{CostHeads, CostOutput, Trunk, TwinLoss};
+use crate::dual::DualClip;
 use crate::pcgrad::{Order, Pooling};
 use crate::reweight::reference::Reference;
 use crate::threshold::Threshold;
@@ -99,8 +100,14 @@ pub struct Config {
     pub short_cost_discount: f64,
     /// Reward guidance coefficient, eta (Eq. 14, Table 2).
     pub eta: f64,
+    /// What eta counts in (O-14).
+    pub guidance: Guidance,
+    /// How the error of behaviour cloning is summed over action entries (Eq. 13, O-12).
+    pub cloning_norm: CloningNorm,
     /// How the policy improvement differentiates (O-13).
     pub policy_gradient: PolicyGradient,
+    /// Last steps of the chain that `policy_gradient = last_k` differentiates (O-13).
+    pub gradient_steps: usize,
     /// Sampler of the next action in the targets (Eq. 3).
     pub target_sampler: Sampler,
     /// Steps of that sampler, at most `diffusion_steps`.
@@ -116,6 +123,16 @@ pub struct Config {
     pub dual_slack: f64,
     /// Whether the violation is counted in limits instead of units of cost.
     pub dual_normalize: bool,
+    /// Smallest log lambda (Appendix B).
+    pub log_lambda_min: f64,
+    /// Largest log lambda (Appendix B).
+    pub log_lambda_max: f64,
+    /// What the clip to that range passes back (O-16).
+    pub dual_clip: DualClip,
+    /// Factor on the squared norm of the dual's weights in its loss; 0 in the paper (O-16).
+    pub dual_decay: f64,
+    /// Whether the dual's last layer starts at 0, and so lambda at 1 (O-16).
+    pub dual_zero_start: bool,
     /// Learning rates at the last step as a share of the first, along half a
     /// cosine; 1, constant, in the paper (O-30).
     pub final_rate: f64,

@@ -16,7 +16,10 @@ pub const OPTIONS: [(&str, &[Entry]); 5] = [
             ("preset", "named set of choices that the other keys started from: `paper` or `quick`"),
             ("data", "path of the recorded data; given by --data"),
             ("task", "task that was recorded, such as ball-run; given by --task"),
-            ("limit", "cost limit d of an episode, in units of recorded cost (Eq. 1); given by --limit, else the paper's for the task"),
+            (
+                "limit",
+                "cost limit d of an episode, in units of recorded cost (Eq. 1); given by --limit, else the paper's for the task",
+            ),
             ("seed", "seed of everything random; given by --seed"),
             ("steps", "training steps (Table 2); given by --steps"),
             ("batch", "transitions of a training step, drawn uniformly with replacement (Table 2)"),
@@ -86,8 +89,20 @@ pub const OPTIONS: [(&str, &[Entry]); 5] = [
             ("short_cost_discount", "discount of the short-term cost, gamma_cS (Eq. 3, Table 2)"),
             ("eta", "reward guidance coefficient (Eq. 14, Table 2)"),
             (
+                "guidance",
+                "what eta counts in: `raw`, scaled reward, or `normalized`, mean |Q_r| of the batch, so that one eta serves tasks with other returns (O-14)",
+            ),
+            (
+                "cloning_norm",
+                "how the squared error of a predicted noise is taken over action entries (Eq. 13): `sum`, or `mean`, which weakens cloning against guidance by their number (O-12)",
+            ),
+            (
                 "policy_gradient",
-                "how the gradient of Eq. 15 reaches the actor: `full`, through all steps of a sampled chain, or `one_step`, through the estimate of the clean action from the noised one, several times cheaper (O-13)",
+                "how the gradient of Eq. 15 reaches the actor: `full`, through all steps of a sampled chain, `last_k`, through its last gradient_steps alone, or `one_step`, through the estimate of the clean action from the noised one, several times cheaper (O-13)",
+            ),
+            (
+                "gradient_steps",
+                "last steps of the sampled chain that `last_k` differentiates, at most diffusion_steps (O-13)",
             ),
             (
                 "target_sampler",
@@ -107,6 +122,17 @@ pub const OPTIONS: [(&str, &[Entry]); 5] = [
                 "added to that, in units of recorded cost; noise in Q_cL otherwise keeps the constraint violated at kappa 0",
             ),
             ("dual_normalize", "whether the violation is counted in limits instead of units of cost"),
+            ("log_lambda_min", "smallest log lambda (Appendix B)"),
+            ("log_lambda_max", "largest log lambda (Appendix B)"),
+            (
+                "dual_clip",
+                "what the clip to that range passes back: `zero_gradient` outside, or `straight_through`, with which lambda can come back from beyond (O-16)",
+            ),
+            (
+                "dual_decay",
+                "factor on the squared norm of the dual's weights in its loss, which keeps lambda near 1; CCAC takes 0.01 (O-16)",
+            ),
+            ("dual_zero_start", "whether the dual's last layer starts at 0, and so lambda at 1 everywhere (O-16)"),
             ("final_rate", "learning rates at the last step as a share of the first, along half a cosine (O-30)"),
             ("gradient_clip", "largest Euclidean norm of a network's gradient; 0 is no limit (O-30)"),
             (

@@ -4,8 +4,9 @@ use armor_core::schedule::Sampler;
 use serde::{Deserialize, Serialize};
 
 use super::Config;
-use crate::actor::PolicyGradient;
+use crate::actor::{CloningNorm, Guidance, PolicyGradient};
 use crate::critic::{CostHeads, CostOutput, Trunk, TwinLoss};
+use crate::dual::DualClip;
 use crate::pcgrad::{Order, Pooling};
 use crate::reweight::reference::Reference;
 use crate::threshold::Threshold;
@@ -69,13 +70,21 @@ impl Preset {
             long_cost_discount: 0.99,
             short_cost_discount: 0.3,
             eta: 1.0,
+            guidance: Guidance::Raw,
+            cloning_norm: CloningNorm::Sum,
             policy_gradient: PolicyGradient::Full,
+            gradient_steps: 3,
             target_sampler: Sampler::Ddpm,
             target_steps: 20,
             relabel_share: 0.0,
             threshold: Threshold::Kappa,
             dual_slack: 0.0,
             dual_normalize: false,
+            log_lambda_min: -20.0,
+            log_lambda_max: 5.0,
+            dual_clip: DualClip::ZeroGradient,
+            dual_decay: 0.0,
+            dual_zero_start: false,
             final_rate: 1.0,
             gradient_clip: 0.0,
             actor_average: 0.0,

@@ -51,7 +51,7 @@ pub fn agreement(
     let mut context = actor.denoiser.context(rows.len());
     actor.denoiser.prepare(parameters, &state, &kappa, &mut context);
     let steps = actor.schedule.chain(Sampler::Ddpm, actor.schedule.steps).collect();
-    let mut chain = Chain::new(&actor.denoiser, steps, rows.len(), false);
+    let mut chain = Chain::new(&actor.denoiser, steps, rows.len(), 0);
     chain.run(&actor.denoiser, parameters, &context, &|stage, sample, out: &mut [f32]| {
         Noise::new(sample as u64).fill_normal(stage as u32, 0, out);
     });

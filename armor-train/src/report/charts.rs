@@ -4,7 +4,6 @@ use super::axis::{Scale, label};
 use super::chart::{Chart, Layer};
 use super::folder::RunFolder;
 use crate::data::{Sorted, ToGo};
-use crate::dual::LOG_RANGE;
 
 /// Charts under one heading.
 pub(super) struct Section<'a> {
@@ -120,7 +119,7 @@ fn cloning(run: &RunFolder) -> Chart<'_> {
 }
 
 fn lambda(run: &RunFolder) -> Chart<'_> {
-    let cap = LOG_RANGE[1].exp();
+    let cap = run.config.log_lambda_max.exp();
     let [none, half, limit, max] = [0.0, run.config.limit / 2.0, run.config.limit, run.provenance.max_kappa]
         .map(|kappa| format!("kappa {}", label(kappa)));
     let columns = [

@@ -8,7 +8,6 @@ use std::fmt;
 use super::columns::value;
 use super::provenance::Provenance;
 use crate::config::Config;
-use crate::dual::LOG_RANGE;
 
 /// How far beyond the largest discounted sum of the data a critic may estimate.
 /// Stitching recorded trajectories can beat the best of them, but not several times over.
@@ -57,10 +56,8 @@ impl Cause {
             Self::RewardCritic => explosion_rule("q_reward", "reward"),
             Self::CostCritic => explosion_rule("q_long_cost", "cost"),
             Self::LambdaCap => format!(
-                "a `lambda_kappa` column is within {:.0} % of exp({}) = {:.1} in {CAP_ROWS} consecutive rows",
-                100.0 * (1.0 - AT_CAP),
-                LOG_RANGE[1],
-                cap()
+                "a `lambda_kappa` column is within {:.0} % of exp(`log_lambda_max`) in {CAP_ROWS} consecutive rows",
+                100.0 * (1.0 - AT_CAP)
             ),
             Self::DeadWeights => {
                 format!("`counterfactual_active` is below {DEAD_SHARE} after two refreshes or any later one")
@@ -87,7 +84,7 @@ impl Cause {
             Self::RewardCritic => "a smaller `critic_rate` or `target_rate`, or a smaller `eta`",
             Self::CostCritic => "a smaller `critic_rate` or `target_rate`, or a smaller `long_cost_discount`",
             Self::LambdaCap => {
-                "a smaller `dual_rate`, or a `kappa_scale` of 1 over the cost limit so that the dual network can tell budgets apart"
+                "a larger `dual_slack` or a smaller `dual_rate`, or a `kappa_scale` of 1 over the cost limit so that the dual network can tell budgets apart"
             }
             Self::DeadWeights => {
                 "a larger `sigma`, or a larger `short_cost_discount` so that Q_cS can exceed a whole unit of cost"
@@ -101,10 +98,6 @@ fn explosion_rule(column: &str, signal: &str) -> String {
     format!(
         "`{column}_min` or `{column}_max` is further from 0 than {EXPLOSION} times the largest discounted sum of {signal} in the data (and than that many units of recorded {signal})"
     )
-}
-
-fn cap() -> f64 {
-    LOG_RANGE[1].exp()
 }
 
 /// An alarm of a run.
@@ -134,6 +127,8 @@ pub(super) struct Alarms {
     two_refreshes: u64,
     limit: f64,
     max_kappa: f64,
+    /// The largest lambda.
+    cap: f64,
     rows_at_cap: u32,
     raised: Vec<Alarm>,
 }
@@ -148,6 +143,7 @@ impl Alarms {
             two_refreshes: config.reweight_warmup.saturating_add(config.reweight_interval),
             limit: config.limit,
             max_kappa: provenance.max_kappa,
+            cap: config.log_lambda_max.exp(),
             rows_at_cap: 0,
             raised: Vec::new(),
         }
@@ -186,11 +182,11 @@ impl Alarms {
             ("lambda_kappa_limit", self.limit),
             ("lambda_kappa_max", self.max_kappa),
         ];
-        let at_cap = budgets.iter().filter(|(column, _)| value(row, column) >= AT_CAP * cap());
+        let at_cap = budgets.iter().filter(|(column, _)| value(row, column) >= AT_CAP * self.cap);
         let at_cap: Vec<String> = at_cap.map(|(_, kappa)| kappa.to_string()).collect();
         self.rows_at_cap = if at_cap.is_empty() { 0 } else { self.rows_at_cap + 1 };
         if self.rows_at_cap >= CAP_ROWS {
-            self.raise(step, Cause::LambdaCap, format!("{:.1} at kappa {}", cap(), at_cap.join(" and ")));
+            self.raise(step, Cause::LambdaCap, format!("{:.1} at kappa {}", self.cap, at_cap.join(" and ")));
         }
     }
 

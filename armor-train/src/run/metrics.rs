@@ -134,7 +134,7 @@ mod tests {
         let surgery = Surgery { conflicts, norms: [10.0, 11.0, 12.0] };
         Metrics {
             critic: CriticMetrics { losses: [1.0, 2.0, 3.0], surgery },
-            actor: ActorLoss { cloning, reward: 5.0, long_cost: 6.0, penalty: 8.0, lambda: 7.0 },
+            actor: ActorLoss { cloning, reward: 5.0, reward_size: 5.0, long_cost: 6.0, penalty: 8.0, lambda: 7.0 },
             reward_range: [5.0 - cloning, 5.0 + cloning],
             long_cost_range: [6.0, 6.5],
             gradient_norms: [13.0, 14.0, 15.0],

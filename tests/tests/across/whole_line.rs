@@ -99,7 +99,7 @@ fn every_rung_is_the_trainers_chain_along_a_falling_budget() {
     };
     for (index, rung) in image.manifest().rungs.iter().enumerate() {
         let steps = actor.schedule.chain(rung.sampler, rung.steps.into()).collect();
-        let mut chain = Chain::new(&actor.denoiser, steps, rows.len(), false);
+        let mut chain = Chain::new(&actor.denoiser, steps, rows.len(), 0);
         chain.run(&actor.denoiser, parameters, &context, &draw);
         let loaded = Policy::load(&image).unwrap();
         let mut controller = HostController::new(loaded, CostLimit::from_cost(trace.limit), trace.seed).unwrap();
