@@ -31,6 +31,7 @@ pub mod reweight;
 pub mod run;
 mod source;
 mod stream;
+pub mod study;
 #[cfg(test)]
 mod testing;
 pub mod threshold;

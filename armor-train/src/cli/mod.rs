@@ -9,6 +9,7 @@ mod progress;
 mod quickstart;
 mod report;
 mod run_folder;
+mod study;
 
 use std::fmt::Display;
 use std::process::ExitCode;
@@ -38,6 +39,7 @@ enum Command {
     Export(export::Export),
     Evaluate(evaluate::Evaluate),
     Report(report::Report),
+    Study(study::Study),
 }
 
 /// Runs the command of the process's arguments.
@@ -52,6 +54,7 @@ pub fn main() -> ExitCode {
         Command::Export(command) => command.run(output),
         Command::Evaluate(command) => command.run(output),
         Command::Report(command) => command.run(output),
+        Command::Study(command) => command.run(output),
     })
 }
 
