@@ -24,6 +24,7 @@ use armor_core::budget::Budget;
 use armor_core::noise::Noise;
 use armor_core::units::{Cost, CostLimit};
 use nalgebra::SVector;
+use serde::{Deserialize, Serialize};
 
 use crate::denoiser::Denoiser;
 use crate::policy::{LoadError, Policy};
@@ -59,7 +60,9 @@ pub struct Step<const ACTION: usize> {
 }
 
 /// Why a control step was not an ordinary one.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+///
+/// The order of the variants is the link's: a new one goes to the end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Fault {
     /// The state has not the policy's length; the action is the fallback.
     StateLength,

@@ -12,6 +12,7 @@
 //! | Eq. 12, the reverse process | `sampler.rs` |
 //! | Appendix B, the denoiser | `denoiser.rs` |
 //! | its matrix-vector products, in one order | `kernel/` |
+//! | - (the wire to a robot or its simulator, `docs/link.md`) | `link/` |
 //!
 //! Words: a *policy* is a trained network and its chains, in flash; *kappa* is
 //! the cost that may still be incurred in this episode; a *chain* is a run of
@@ -57,6 +58,7 @@ mod denoiser;
 mod fixture;
 pub mod golden;
 mod kernel;
+pub mod link;
 mod policy;
 mod sampler;
 

@@ -106,6 +106,11 @@ impl<'a> Policy<'a> {
         &self.shape
     }
 
+    /// The largest cost limit that the policy may be given.
+    pub const fn trained_max(&self) -> Cost {
+        self.kappa.trained_max
+    }
+
     /// Calls of the denoiser that each rung takes, longest first.
     pub fn rungs(&self) -> impl Iterator<Item = usize> + use<'a> {
         self.chains.into_iter().map(<[_]>::len).filter(|&steps| steps > 0)

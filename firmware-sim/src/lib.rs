@@ -7,6 +7,7 @@
 //! | [`calibrate`] | how far a plant is from a recording |
 //! | [`image_file`], [`chip`] | an image in a file; two slots of flash that boot one |
 //! | [`host`], [`flight`], [`summary`] | the controller on this computer, in a fixed-rate loop, and its scores |
+//! | [`link`] | the controller behind a wire, for a robot or its simulator |
 //! | [`latency`], [`telemetry`] | what each action took; a line a control step |
 //! | [`reference`](mod@reference), [`verify`](mod@verify) | a second evaluation in f64; the checks of an image |
 //! | [`cli`] | the commands |
@@ -32,6 +33,7 @@ pub mod flight;
 pub mod host;
 pub mod image_file;
 pub mod latency;
+pub mod link;
 pub mod memory;
 pub mod plant;
 #[cfg(test)]

@@ -5,6 +5,7 @@ mod flash;
 mod inspect;
 pub mod output;
 mod run;
+mod serve;
 mod trace;
 mod verify;
 
@@ -36,6 +37,7 @@ enum Command {
     Flash(flash::Flash),
     Run(run::Run),
     Bench(bench::Bench),
+    Serve(serve::Serve),
 }
 
 /// Runs the command of the process's arguments.
@@ -49,6 +51,7 @@ pub fn main() -> ExitCode {
         Command::Flash(command) => command.run(output),
         Command::Run(command) => command.run(output),
         Command::Bench(command) => command.run(output),
+        Command::Serve(command) => command.run(output),
     })
 }
 

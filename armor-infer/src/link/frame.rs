@@ -1,0 +1,116 @@
+//! Frames: a message in postcard, its CRC-32, COBS over both, a zero at the end.
+//!
+//! COBS leaves no zero within a frame, so a receiver that lost its place finds
+//! the next frame after the next zero (Cheshire and Baker, "Consistent Overhead
+//! Byte Stuffing", 1999).
+
+use core::fmt;
+
+use crc::{CRC_32_ISO_HDLC, Crc, Table};
+use postcard::ser_flavors::crc::CrcModifier;
+use postcard::ser_flavors::{Cobs, Slice};
+use serde::{Deserialize, Serialize};
+
+/// Bytes of the checksum behind a message.
+pub const CHECKSUM_BYTES: usize = 4;
+
+/// What ends a frame.
+const END: u8 = 0;
+
+/// As in a policy image: CRC-32 of Ethernet and zip.
+static CRC: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
+
+/// Why bytes are no message, or a message no bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FrameError {
+    /// The bytes are not what was sent: no COBS, too short, or the wrong checksum.
+    Damaged,
+    /// The bytes are what was sent, and no message of this version.
+    Malformed,
+    /// The frame does not fit the buffer that it was to be written to.
+    Full,
+}
+
+impl fmt::Display for FrameError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Damaged => "the frame is damaged; ask again",
+            Self::Malformed => "the frame holds no message of this version; compare the versions of both sides",
+            Self::Full => "the frame is longer than its buffer; give it more room",
+        })
+    }
+}
+
+impl core::error::Error for FrameError {}
+
+/// The longest frame of a message of at most `message` bytes, its end included.
+pub const fn frame_bytes(message: usize) -> usize {
+    cobs::max_encoding_length(message + CHECKSUM_BYTES) + 1
+}
+
+/// Writes a message as a frame to the front of `buffer`; returns the frame.
+///
+/// # Errors
+/// [`FrameError::Full`]
+pub fn encode<'b>(message: &impl Serialize, buffer: &'b mut [u8]) -> Result<&'b [u8], FrameError> {
+    let frame = Cobs::try_new(Slice::new(buffer)).map_err(|_| FrameError::Full)?;
+    let checked = CrcModifier::new(frame, CRC.digest());
+    postcard::serialize_with_flavor::<_, _, &'b mut [u8]>(message, checked)
+        .map(|frame| &*frame)
+        .map_err(|_| FrameError::Full)
+}
+
+/// Reads the message of a frame, with or without the zero at its end; the
+/// frame is overwritten by its content.
+///
+/// # Errors
+/// [`FrameError::Damaged`], [`FrameError::Malformed`]
+pub fn decode<'f, T: Deserialize<'f>>(frame: &'f mut [u8]) -> Result<T, FrameError> {
+    let length = cobs::decode_in_place(frame).map_err(|_| FrameError::Damaged)?;
+    let content = frame.get(..length).ok_or(FrameError::Damaged)?;
+    let (message, checksum) = content.split_last_chunk::<CHECKSUM_BYTES>().ok_or(FrameError::Damaged)?;
+    if CRC.checksum(message) != u32::from_le_bytes(*checksum) {
+        return Err(FrameError::Damaged);
+    }
+    match postcard::take_from_bytes(message) {
+        Ok((message, [])) => Ok(message),
+        _ => Err(FrameError::Malformed),
+    }
+}
+
+/// Finds frames in a stream of bytes; holds at most `N` bytes of one.
+#[derive(Clone, Debug)]
+pub struct Receiver<const N: usize> {
+    bytes: [u8; N],
+    /// Bytes of the frame so far; above `N` where it is too long to be kept.
+    length: usize,
+}
+
+impl<const N: usize> Receiver<N> {
+    /// A receiver at the start of a stream.
+    pub const fn new() -> Self {
+        Self { bytes: [0; N], length: 0 }
+    }
+
+    /// Takes the next byte; returns a frame, without its end, where the byte
+    /// ends one.
+    ///
+    /// Empty frames and those of more than `N` bytes are passed over.
+    pub fn push(&mut self, byte: u8) -> Option<&mut [u8]> {
+        if byte != END {
+            if let Some(place) = self.bytes.get_mut(self.length) {
+                *place = byte;
+            }
+            self.length = (self.length + 1).min(N + 1);
+            return None;
+        }
+        let length = core::mem::take(&mut self.length);
+        self.bytes.get_mut(..length).filter(|frame| !frame.is_empty())
+    }
+}
+
+impl<const N: usize> Default for Receiver<N> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
