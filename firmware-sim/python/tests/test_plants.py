@@ -9,8 +9,8 @@ import pytest
 pytest.importorskip("mujoco")
 pytest.importorskip("pybullet")
 
-from armor_plant import plants, repairs  # noqa: E402
-from armor_plant.tasks import TASKS  # noqa: E402
+from armor_plant import plants, repairs
+from armor_plant.tasks import TASKS
 
 STEPS = 20
 
@@ -68,7 +68,7 @@ def test_array_defaults_are_allowed_for_as_long_as_it_says() -> None:
 
             @dataclasses.dataclass
             class Wrong:
-                position: list[float] = []  # noqa: RUF008, RUF012
+                position: list[float] = []  # noqa: RUF008
 
     if sys.version_info >= (3, 11):
         with pytest.raises(ValueError, match="mutable default"):

@@ -39,8 +39,7 @@ def _parser() -> argparse.ArgumentParser:
     line.add_argument(
         "--serve-command",
         metavar="COMMAND",
-        help="a command that serves on its standard streams, "
-        "as 'firmware-sim serve IMAGE --stdio'",
+        help="a command that serves on its standard streams, as 'firmware-sim serve IMAGE --stdio'",
     )
     add("--limit", type=float, metavar="D", help="cost that an episode may incur (the paper's)")
     add("--episodes", type=_count, default=20, help="episodes to fly (20)")
