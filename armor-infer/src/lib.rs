@@ -13,6 +13,7 @@
 //! | Appendix B, the denoiser | `denoiser.rs` |
 //! | its matrix-vector products, in one order | `kernel/` |
 //! | - (the wire to a robot or its simulator, `docs/link.md`) | `link/` |
+//! | the budget across resets, in flash | `journal.rs` |
 //!
 //! Words: a *policy* is a trained network and its chains, in flash; *kappa* is
 //! the cost that may still be incurred in this episode; a *chain* is a run of
@@ -57,6 +58,7 @@ mod denoiser;
 #[cfg(test)]
 mod fixture;
 pub mod golden;
+pub mod journal;
 mod kernel;
 pub mod link;
 mod policy;

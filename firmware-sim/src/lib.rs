@@ -29,6 +29,7 @@ pub mod cli;
 pub mod file;
 #[cfg(test)]
 mod fixture;
+pub mod flash;
 pub mod flight;
 pub mod host;
 pub mod image_file;
