@@ -10,7 +10,7 @@
 //! |---|---|
 //! | Eq. 1, cost limit `d` | [`units::CostLimit`] |
 //! | section 3.5, kappa at run time | [`budget::Budget`] |
-//! | Eq. 11, forward process | [`schedule::VpSchedule`] |
+//! | Eq. 11, forward process | [`schedule::Schedule`] |
 //! | Eq. 12, reverse process | [`schedule::ChainStep`] |
 //! | Appendix B, activations | [`mish`] |
 //! | Appendix B, denoiser | [`shape::Shape`] |

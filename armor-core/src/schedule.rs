@@ -1,26 +1,46 @@
-//! The variance-preserving noise schedule and the steps of a denoising chain.
+//! Noise schedules and the steps of a denoising chain.
 //!
-//! The paper leaves the schedule open; this is the one of score-based
-//! diffusion discretised to `N` steps (`beta_min` 0.1, `beta_max` 10): its
-//! cumulative product has the closed form
+//! The paper leaves the schedule open. [`Noising::Vp`] is that of score-based
+//! diffusion discretised to `N` steps: its cumulative product has the closed form
 //! `abar_n = exp(-(beta_min t + (beta_max - beta_min) t^2 / 2))`, `t = n / N`,
 //! and falls to 0.0064 at `n = N`, so a chain may start from `N(0, I)`.
+//! [`Noising::Cosine`] (Nichol and Dhariwal 2021) keeps more of the action in the
+//! middle of a chain and falls to 1e-5.
 //!
 //! Words: `n` runs from `N` (pure noise) to 0 (the action); `abar` is the
 //! paper's alpha-bar (Eq. 11).
+
+use core::f64::consts::FRAC_PI_2;
 
 use serde::{Deserialize, Serialize};
 
 /// The largest number of steps a chain may have.
 pub const MAX_STEPS: usize = 64;
 
-/// A variance-preserving schedule over `steps` steps (Eq. 11).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct VpSchedule {
-    /// Noise rate at `t = 0`.
-    pub beta_min: f64,
-    /// Noise rate at `t = 1`.
-    pub beta_max: f64,
+/// Noise rate of [`Noising::Vp`] at `t = 0`.
+const BETA_MIN: f64 = 0.1;
+/// Noise rate of [`Noising::Vp`] at `t = 1`.
+const BETA_MAX: f64 = 10.0;
+/// Keeps the first noise of [`Noising::Cosine`] from being too small.
+const COSINE_OFFSET: f64 = 0.008;
+/// The largest `beta_n` of [`Noising::Cosine`], met at `n = N`, where the cosine is 0.
+const COSINE_BETA_MAX: f64 = 0.999;
+
+/// How fast an action is noised.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Noising {
+    /// Variance-preserving, `beta(t)` linear from 0.1 to 10 (the `paper` preset).
+    Vp,
+    /// `abar_n = cos^2(pi/2 (t + s) / (1 + s)) / cos^2(pi/2 s / (1 + s))`, `s = 0.008`.
+    Cosine,
+}
+
+/// A noise schedule over `steps` steps (Eq. 11).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Schedule {
+    /// How fast an action is noised.
+    pub noising: Noising,
     /// `N`, 1 to [`MAX_STEPS`].
     pub steps: usize,
 }
@@ -59,16 +79,31 @@ pub struct ChainStep<T = f32> {
     pub sigma: T,
 }
 
-impl VpSchedule {
+impl Schedule {
     /// The schedule of the `paper` preset over `steps` steps.
-    pub const fn new(steps: usize) -> Self {
-        Self { beta_min: 0.1, beta_max: 10.0, steps }
+    pub const fn vp(steps: usize) -> Self {
+        Self { noising: Noising::Vp, steps }
+    }
+
+    /// The cosine schedule over `steps` steps.
+    pub const fn cosine(steps: usize) -> Self {
+        Self { noising: Noising::Cosine, steps }
     }
 
     /// `abar_n`, the share of the action's variance left at level `n`; `abar_0 = 1`.
     pub fn alpha_bar(&self, n: usize) -> f64 {
-        let t = n as f64 / self.steps as f64;
-        libm::exp(-(self.beta_min * t + 0.5 * (self.beta_max - self.beta_min) * t * t))
+        let time = |n: usize| n as f64 / self.steps as f64;
+        match self.noising {
+            Noising::Vp => {
+                let t = time(n);
+                libm::exp(-(BETA_MIN * t + 0.5 * (BETA_MAX - BETA_MIN) * t * t))
+            }
+            Noising::Cosine => {
+                let cosine = |t: f64| libm::cos(FRAC_PI_2 * (t + COSINE_OFFSET) / (1.0 + COSINE_OFFSET));
+                let curve = |n: usize| libm::pow(cosine(time(n)) / cosine(0.0), 2.0);
+                curve(n).max((1.0 - COSINE_BETA_MAX) * curve(n.saturating_sub(1)))
+            }
+        }
     }
 
     /// `beta_n = 1 - abar_n / abar_{n-1}`, the variance added at step `n >= 1`.
@@ -164,7 +199,7 @@ mod tests {
     use super::*;
     use std::vec::Vec;
 
-    const N20: VpSchedule = VpSchedule::new(20);
+    const N20: Schedule = Schedule::vp(20);
 
     #[track_caller]
     fn close(actual: f64, expected: f64, tolerance: f64) {
@@ -181,12 +216,31 @@ mod tests {
         close(N20.alpha_bar(20), 0.00641, 5e-6);
     }
 
+    /// `alphas_cumprod` of the publication's recipe in NumPy, with its clip of beta to 0.999:
+    /// `t = np.arange(21) / 20; f = np.cos((t + .008) / 1.008 * np.pi / 2) ** 2`
+    /// `np.cumprod(1 - np.minimum(1 - f[1:] / f[:-1], .999))[[0, 9, 18, 19]]`
+    #[test]
+    fn the_cosine_schedule_is_the_publications() {
+        for (n, expected) in [
+            (1, 0.99200727868421856),
+            (10, 0.49384359044063775),
+            (19, 0.006059644621451166),
+            (20, 6.0596446214511716e-06),
+        ] {
+            close(Schedule::cosine(20).alpha_bar(n), expected, 1e-12);
+        }
+        assert_eq!(Schedule::cosine(20).alpha_bar(0), 1.0);
+        close(Schedule::cosine(1).beta(1), 0.999, 1e-12);
+    }
+
     #[test]
     fn alpha_bar_is_the_product_of_one_minus_beta() {
-        let mut product = 1.0;
-        for n in 1..=20 {
-            product *= 1.0 - N20.beta(n);
-            close(N20.alpha_bar(n), product, 1e-15);
+        for schedule in [N20, Schedule::cosine(20)] {
+            let mut product = 1.0;
+            for n in 1..=20 {
+                product *= 1.0 - schedule.beta(n);
+                close(schedule.alpha_bar(n), product, 1e-15);
+            }
         }
     }
 
@@ -213,12 +267,14 @@ mod tests {
     /// `sqrt(abar_m) x0` and variance `1 - abar_m`, when `x0` is exact.
     #[test]
     fn every_step_keeps_the_marginals() {
-        for sampler in [Sampler::Ddpm, Sampler::Ddim] {
+        let samplers = [Sampler::Ddpm, Sampler::Ddim];
+        for (schedule, sampler) in [N20, Schedule::cosine(20)].into_iter().flat_map(|s| samplers.map(|kind| (s, kind)))
+        {
             for length in 1..=20 {
-                let mut levels = N20.chain(sampler, length).map(|s| s.n).skip(1).collect::<Vec<_>>();
+                let mut levels = schedule.chain(sampler, length).map(|s| s.n).skip(1).collect::<Vec<_>>();
                 levels.push(0);
-                for (step, m) in N20.chain(sampler, length).zip(levels) {
-                    let (here, there) = (N20.alpha_bar(step.n), N20.alpha_bar(m));
+                for (step, m) in schedule.chain(sampler, length).zip(levels) {
+                    let (here, there) = (schedule.alpha_bar(step.n), schedule.alpha_bar(m));
                     let (to_x0, to_action) = (step.to_x0, step.to_action);
                     close(to_x0 + to_action * here.sqrt(), there.sqrt(), 1e-12);
                     close(to_action.powi(2) * (1.0 - here) + step.sigma.powi(2), 1.0 - there, 1e-12);

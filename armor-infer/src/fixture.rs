@@ -4,7 +4,7 @@ use armor_core::image::{
     ALIGNMENT, KappaRange, Manifest, PolicyImage, Precision, Provenance, Rung, SECTION_COUNT, SectionKind, write,
 };
 use armor_core::noise::Noise;
-use armor_core::schedule::{Sampler, VpSchedule};
+use armor_core::schedule::{Sampler, Schedule};
 use armor_core::shape::Shape;
 use armor_core::units::{Cost, CostLimit};
 use std::vec;
@@ -42,7 +42,7 @@ impl Fixture {
             shape,
             precision: Precision::F32,
             kappa: KappaRange { scale: 0.05, trained_max: Cost::from_incurred(TRAINED_MAX).unwrap() },
-            schedule: VpSchedule::new(shape.steps.into()),
+            schedule: Schedule::vp(shape.steps.into()),
             rungs: Default::default(),
             provenance: Provenance {
                 version: "0.0.0",

@@ -78,7 +78,7 @@ mod tests {
     use super::*;
     use crate::fixture::{Fixture, SMALL};
     use armor_core::image::SectionKind;
-    use armor_core::schedule::{Sampler as Kind, VpSchedule};
+    use armor_core::schedule::{Sampler as Kind, Schedule};
     use std::vec::Vec;
 
     const SEED: u64 = 3;
@@ -122,7 +122,7 @@ mod tests {
     /// With a constant eps, DDIM keeps its first estimate all the way.
     #[test]
     fn ddim_under_a_constant_network_keeps_its_first_estimate() {
-        let abar = VpSchedule::new(SMALL.steps.into()).alpha_bar(SMALL.steps.into());
+        let abar = Schedule::vp(SMALL.steps.into()).alpha_bar(SMALL.steps.into());
         for steps in [1, 3, SMALL.steps] {
             for eps in [0.0, 0.5] {
                 let action = run(&constant(eps, Kind::Ddim, steps, WIDE));
@@ -138,7 +138,7 @@ mod tests {
     #[test]
     fn ddpm_under_a_silent_network_sums_its_scaled_draws() {
         let steps = usize::from(SMALL.steps);
-        let schedule = VpSchedule::new(steps);
+        let schedule = Schedule::vp(steps);
         let action = run(&constant(0.0, Kind::Ddpm, SMALL.steps, WIDE));
         for (entry, action) in action.into_iter().enumerate() {
             let mut expected = draw(0)[entry] / schedule.alpha_bar(steps).sqrt();

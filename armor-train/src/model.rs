@@ -1,11 +1,11 @@
 //! The networks of a run: their layouts, their numbers, their optimisers.
 
 use armor_core::noise::{Noise, uniform};
-use armor_core::schedule::{ChainStep, VpSchedule};
+use armor_core::schedule::{ChainStep, Schedule};
 use serde::{Deserialize, Serialize};
 
-use crate::actor::Actor;
 use crate::actor::denoiser::{Denoiser, Widths};
+use crate::actor::{Actor, Family, Process};
 use crate::config::Config;
 use crate::critic::{Critic, CriticOptions, Trunk};
 use crate::dual::{Dual, DualOptions};
@@ -76,11 +76,21 @@ impl Model {
             time_embedding: config.time_embedding,
             steps: config.diffusion_steps,
         };
-        let schedule = VpSchedule::new(config.diffusion_steps);
+        let process = Process {
+            schedule: Schedule { noising: config.noise_schedule, steps: config.diffusion_steps },
+            family: config.policy,
+            gaussian_std: config.gaussian_std,
+            variance: config.reverse_variance,
+            temperature: config.temperature,
+        };
+        let denoiser = Denoiser::new(widths, config.kappa_scale);
         Self {
             actor: Actor {
-                denoiser: Denoiser::new(widths, config.kappa_scale),
-                schedule,
+                denoiser: match config.policy {
+                    Family::Diffusion => denoiser,
+                    Family::Gaussian => denoiser.blind(),
+                },
+                process,
                 policy_gradient: config.policy_gradient,
                 gradient_steps: config.gradient_steps,
                 cloning_norm: config.cloning_norm,
@@ -109,7 +119,7 @@ impl Model {
                 config.kappa_scale,
             ),
             dual_decay: config.dual_decay,
-            target_chain: schedule.chain(config.target_sampler, config.target_steps).collect(),
+            target_chain: process.chain(config.target_sampler, config.target_steps),
             gradient_clip: config.gradient_clip,
             pcgrad: config.pcgrad,
             // Trunks of their own take their own gradients, which meet nowhere.

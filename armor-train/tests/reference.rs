@@ -2,10 +2,10 @@
 //! program, `tests/reference/step.py`, in f64. The program is run by hand; its
 //! output, `step.json`, holds all inputs and all expected outputs.
 
-use armor_core::schedule::{Sampler, VpSchedule};
+use armor_core::schedule::{Sampler, Schedule};
 use armor_train::actor::chain::Chain;
 use armor_train::actor::denoiser::{Denoiser, Widths};
-use armor_train::actor::{Actor, CloningNorm, Guidance, PolicyGradient};
+use armor_train::actor::{Actor, CloningNorm, Guidance, PolicyGradient, Process};
 use armor_train::critic::{Critic, Task};
 use armor_train::dual::{Dual, DualOptions};
 use armor_train::model::{Model, Optimisers, Parameters};
@@ -68,11 +68,11 @@ impl Reference {
             steps: STEPS,
         };
         let kappa_scale = self.0["config"]["kappa_scale"].as_f64().unwrap();
-        let schedule = VpSchedule::new(STEPS);
+        let schedule = Schedule::vp(STEPS);
         Model {
             actor: Actor {
                 denoiser: Denoiser::new(widths, kappa_scale),
-                schedule,
+                process: Process::paper(schedule),
                 policy_gradient,
                 gradient_steps: 0,
                 cloning_norm: CloningNorm::Sum,
@@ -284,7 +284,7 @@ fn a_short_deterministic_chain_has_pytorchs_actions() {
     let reference = Reference::read();
     let actor = reference.model(PolicyGradient::Full).actor;
     let parameters = reference.numbers("actor");
-    let steps: Vec<_> = actor.schedule.chain(Sampler::Ddim, 3).collect();
+    let steps = actor.process.chain(Sampler::Ddim, 3);
     let levels: Vec<f64> = steps.iter().map(|step| step.n as f64).collect();
     reference.expect("ddim_levels", &levels);
     let mut context = actor.denoiser.context(SAMPLES);
@@ -299,7 +299,7 @@ fn a_short_deterministic_chain_has_pytorchs_actions() {
 #[test]
 fn the_schedule_is_pytorchs() {
     let reference = Reference::read();
-    let schedule = VpSchedule::new(STEPS);
+    let schedule = Schedule::vp(STEPS);
     let alpha_bars: Vec<f64> = (0..=STEPS).map(|n| schedule.alpha_bar(n)).collect();
     reference.expect("alpha_bar", &alpha_bars);
 }

@@ -4,7 +4,7 @@ use armor_core::image::{
     KappaRange, Manifest, Precision, Provenance, Quality, Rung, SECTION_COUNT, SectionKind, write,
 };
 use armor_core::noise::Noise;
-use armor_core::schedule::{Sampler, VpSchedule};
+use armor_core::schedule::{Sampler, Schedule};
 use armor_core::shape::Shape;
 use armor_core::units::{Cost, CostLimit};
 use armor_infer::{Controller, Policy};
@@ -33,7 +33,7 @@ impl Parts {
     /// Random weights of the usual size, actions within -1 and 1, one DDPM and
     /// one shorter DDIM chain, and no golden trace yet.
     pub(crate) fn random(task: &'static str, shape: Shape, seed: u64) -> Self {
-        let schedule = VpSchedule::new(shape.steps.into());
+        let schedule = Schedule::vp(shape.steps.into());
         let rungs = [(Sampler::Ddpm, shape.steps), (Sampler::Ddim, 2)].map(|(sampler, steps)| Rung { sampler, steps });
         let chain = rungs.iter().flat_map(|rung| schedule.chain(rung.sampler, rung.steps.into()));
         let chain: Vec<u32> = chain.flat_map(|step| step.to_f32().to_words()).collect();

@@ -2,7 +2,7 @@
 
 use super::header::{Header, checksum};
 use super::*;
-use crate::schedule::{Sampler, VpSchedule};
+use crate::schedule::{Sampler, Schedule};
 use crate::shape::Shape;
 use crate::units::Cost;
 use std::vec;
@@ -36,7 +36,7 @@ pub(super) struct Parts {
 impl Parts {
     /// Every word is its own number, except where the format says more.
     pub(super) fn new(shape: Shape) -> Self {
-        let schedule = VpSchedule::new(shape.steps.into());
+        let schedule = Schedule::vp(shape.steps.into());
         let rungs = [Rung { sampler: Sampler::Ddpm, steps: shape.steps }, Rung { sampler: Sampler::Ddim, steps: 1 }];
         let quality =
             Quality { rung: 1, limit: Cost::from_raw(99), episodes: 20, reward_normalized: 0.25, cost_normalized: 0.5 };

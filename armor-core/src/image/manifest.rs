@@ -4,7 +4,7 @@ use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
 use super::ImageError;
-use crate::schedule::{MAX_STEPS, Sampler, VpSchedule};
+use crate::schedule::{MAX_STEPS, Sampler, Schedule};
 use crate::shape::Shape;
 use crate::units::Cost;
 
@@ -25,7 +25,7 @@ pub struct Manifest<'a> {
     /// How the remaining budget enters the network.
     pub kappa: KappaRange,
     /// The noise schedule behind the chains.
-    pub schedule: VpSchedule,
+    pub schedule: Schedule,
     /// The chains that the policy may fly, none longer than the one before.
     pub rungs: Vec<Rung, MAX_RUNGS>,
     /// Where the policy comes from.

@@ -1,6 +1,6 @@
 use super::fixture::{Aligned, Parts, SHAPE, TINY, resealed, seal, word, words};
 use super::*;
-use crate::schedule::{ChainStep, Sampler, VpSchedule};
+use crate::schedule::{ChainStep, Sampler, Schedule};
 use std::vec::Vec;
 
 #[test]
@@ -35,7 +35,7 @@ fn what_was_written_is_read_back_in_place() {
     assert_eq!((kappa_3.bias.len(), context.weights.len(), numbers.context_kappa.len()), (6, 3 * 5, 6 * 5));
 
     let chain = |index| numbers.chain(image.manifest(), index).collect::<Vec<_>>();
-    let expected = |sampler, steps| VpSchedule::new(7).chain(sampler, steps).map(ChainStep::<f64>::to_f32);
+    let expected = |sampler, steps| Schedule::vp(7).chain(sampler, steps).map(ChainStep::<f64>::to_f32);
     assert_eq!(chain(0), expected(Sampler::Ddpm, 7).collect::<Vec<_>>());
     assert_eq!(chain(1), expected(Sampler::Ddim, 1).collect::<Vec<_>>());
     assert_eq!(chain(2), []);

@@ -45,6 +45,8 @@ pub struct Widths {
 pub struct Denoiser {
     widths: Widths,
     kappa_scale: f64,
+    /// Whether the noisy action enters the network.
+    sees_action: bool,
     kappa: Mlp,
     time: Mlp,
     first: Linear,
@@ -122,7 +124,12 @@ impl Denoiser {
         let inputs = action + state + kappa_embedding + time_embedding;
         let first = Linear { inputs, outputs: hidden, offset: time.end() };
         let body = Mlp::new(&[hidden, hidden, hidden, action], first.end(), Activation::Mish, None);
-        Self { widths, kappa_scale, kappa, time, first, body }
+        Self { widths, kappa_scale, sees_action: true, kappa, time, first, body }
+    }
+
+    /// The same layout for a network that does not see the noisy action, `W_a = 0` for good.
+    pub fn blind(self) -> Self {
+        Self { sees_action: false, ..self }
     }
 
     /// Widths of the network.
@@ -170,6 +177,10 @@ impl Denoiser {
         self.kappa.initialise(parameters, draws);
         self.time.initialise(parameters, draws);
         self.first.initialise(parameters, draws);
+        if !self.sees_action {
+            let [of_action, ..] = self.blocks();
+            parameters[self.first.offset..][..of_action.len() * self.first.outputs].fill(T::zero());
+        }
         self.body.initialise(parameters, draws);
     }
 
@@ -228,12 +239,14 @@ impl Denoiser {
 
     /// Predicts the noise in `call.action` at `call.levels`; with `slopes`, a backward pass may follow.
     pub fn forward<T: Scalar>(&self, parameters: &[T], context: &Context<T>, call: &mut Call<T>, slopes: bool) {
-        let [of_action, ..] = self.blocks();
         call.kept.clear();
         call.kept.extend(0..call.action.ncols());
         call.hidden.copy_from(&context.constant);
-        let hidden = call.hidden.as_mut_slice();
-        product(hidden, self.first.block(parameters, of_action), (&call.action).into(), Update::Add);
+        if self.sees_action {
+            let [of_action, ..] = self.blocks();
+            let hidden = call.hidden.as_mut_slice();
+            product(hidden, self.first.block(parameters, of_action), (&call.action).into(), Update::Add);
+        }
         Activation::Mish.apply_by_level(
             &mut call.hidden,
             slopes.then_some(&mut call.hidden_slope),
@@ -257,12 +270,15 @@ impl Denoiser {
         let columns = call.kept.len();
         scale(hidden_gradient, &call.hidden_slope, columns);
 
-        let [of_action, ..] = self.blocks();
-        let (delta, action) = (Operand::leading(hidden_gradient, columns), Operand::leading(&call.action, columns));
-        self.first.add_block_gradient(gradient, of_action.clone(), delta, action);
-        let weights = self.first.block(parameters, of_action).transposed();
-        let action_gradient = &mut call.action_gradient.as_mut_slice()[..self.widths.action * columns];
-        product(action_gradient, weights, delta, Update::Replace);
+        // A network that does not see the action leaves its gradient at zero.
+        if self.sees_action {
+            let [of_action, ..] = self.blocks();
+            let (delta, action) = (Operand::leading(hidden_gradient, columns), Operand::leading(&call.action, columns));
+            self.first.add_block_gradient(gradient, of_action.clone(), delta, action);
+            let weights = self.first.block(parameters, of_action).transposed();
+            let action_gradient = &mut call.action_gradient.as_mut_slice()[..self.widths.action * columns];
+            product(action_gradient, weights, delta, Update::Replace);
+        }
         for (column, &sample) in hidden_gradient.column_iter().zip(&call.kept) {
             let mut constant_sum = context.constant_gradient.column_mut(sample);
             constant_sum += &column;

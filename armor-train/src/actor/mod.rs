@@ -8,8 +8,9 @@
 pub mod chain;
 pub mod denoiser;
 mod guidance;
+mod process;
 
-use armor_core::schedule::{Sampler, VpSchedule};
+use armor_core::schedule::Sampler;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
@@ -21,6 +22,7 @@ use chain::{Chain, Draw, clip, coefficients};
 use denoiser::{Call, Context, Denoiser};
 
 pub use guidance::{CloningNorm, Guidance};
+pub use process::{Family, Process, ReverseVariance};
 
 /// Where the action `a_pi` of the policy improvement comes from, and how its gradient flows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -39,8 +41,8 @@ pub enum PolicyGradient {
 pub struct Actor {
     /// The noise predictor.
     pub denoiser: Denoiser,
-    /// The forward process.
-    pub schedule: VpSchedule,
+    /// The chains of the policy.
+    pub process: Process,
     /// How the policy improvement differentiates.
     pub policy_gradient: PolicyGradient,
     /// Steps of [`PolicyGradient::LastK`].
@@ -148,7 +150,7 @@ impl Actor {
     pub fn tape<T: Scalar>(&self, critic: &Critic, dual: &Dual, samples: usize) -> ActorTape<T> {
         let steps: Vec<_> = match self.policy_gradient {
             PolicyGradient::Full | PolicyGradient::LastK => {
-                self.schedule.chain(Sampler::Ddpm, self.schedule.steps).collect()
+                self.process.chain(Sampler::Ddpm, self.process.schedule.steps)
             }
             PolicyGradient::OneStep => Vec::new(),
         };
@@ -236,7 +238,8 @@ impl Actor {
     }
 
     /// Eqs. 11 and 13: noises the recorded actions, predicts the noise, and sets
-    /// the gradient of `L_BC` with respect to the prediction. Returns the summed loss.
+    /// the gradient of `L_BC` with respect to the prediction. A Gaussian predicts the
+    /// recorded action itself, and sees the noise alone. Returns the summed loss.
     fn clone_behaviour<T: Scalar>(
         &self,
         parameters: &[T],
@@ -248,16 +251,25 @@ impl Actor {
         let call = &mut tape.call;
         let norm = T::of(self.cloning_norm.factor(batch.action.nrows()));
         call.levels.copy_from_slice(levels);
-        for (sample, &level) in levels.iter().enumerate() {
-            let alpha_bar = self.schedule.alpha_bar(level);
-            let (signal, spread) = (T::of(alpha_bar.sqrt()), T::of((1.0 - alpha_bar).sqrt()));
-            let noised = batch.action.column(sample) * signal + noise.column(sample) * spread;
-            call.action.set_column(sample, &noised);
-        }
+        let target = match self.process.family {
+            Family::Diffusion => {
+                for (sample, &level) in levels.iter().enumerate() {
+                    let alpha_bar = self.process.schedule.alpha_bar(level);
+                    let (signal, spread) = (T::of(alpha_bar.sqrt()), T::of((1.0 - alpha_bar).sqrt()));
+                    let noised = batch.action.column(sample) * signal + noise.column(sample) * spread;
+                    call.action.set_column(sample, &noised);
+                }
+                noise
+            }
+            Family::Gaussian => {
+                call.action.copy_from(noise);
+                &batch.action
+            }
+        };
         self.denoiser.forward(parameters, &tape.context, call, true);
         let mut loss = 0.0;
         for (sample, &weight) in batch.weight.iter().enumerate() {
-            let error = call.noise().column(sample) - noise.column(sample);
+            let error = call.noise().column(sample) - target.column(sample);
             loss += (norm * weight * error.norm_squared()).to_f64();
             call.noise_gradient().set_column(sample, &(error * (T::of(2.0) * norm * weight * share)));
         }
@@ -304,7 +316,7 @@ impl Actor {
 
     /// The coefficients of the estimate of `x0` at a noise level.
     fn estimate<T: Scalar>(&self, level: usize) -> [T; 5] {
-        coefficients(&self.schedule.step(Sampler::Ddpm, level, level - 1))
+        coefficients(&self.process.estimate(level))
     }
 }
 

@@ -1,6 +1,6 @@
 //! Gradients of the whole actor by finite differences, in f64.
 
-use armor_core::schedule::{Sampler, VpSchedule};
+use armor_core::schedule::{Sampler, Schedule};
 use nalgebra::DMatrix;
 
 use super::denoiser::{Denoiser, Widths};
@@ -33,6 +33,7 @@ struct Fixture {
     dual_parameters: Vec<f64>,
     batch: Batch<f64>,
     cloning: DMatrix<f64>,
+    levels: [usize; SAMPLES],
 }
 
 fn fixture(policy_gradient: PolicyGradient) -> Fixture {
@@ -51,7 +52,7 @@ fn fixture(policy_gradient: PolicyGradient) -> Fixture {
         dual_parameters: fill(dual.size(), 3),
         actor: Actor {
             denoiser,
-            schedule: VpSchedule::new(STEPS),
+            process: Process::paper(Schedule::vp(STEPS)),
             policy_gradient,
             gradient_steps: 4,
             cloning_norm: CloningNorm::Sum,
@@ -63,7 +64,17 @@ fn fixture(policy_gradient: PolicyGradient) -> Fixture {
         dual,
         batch,
         cloning: DMatrix::from_vec(2, SAMPLES, fill(2 * SAMPLES, 13)),
+        levels: LEVELS,
     }
+}
+
+/// A Gaussian policy on the same batch, wide enough that its clip is met.
+fn gaussian(policy_gradient: PolicyGradient) -> Fixture {
+    let mut f = fixture(policy_gradient);
+    f.actor.denoiser = Denoiser::new(Widths { steps: 1, ..WIDTHS }, 0.5).blind();
+    f.actor.process = Process { family: Family::Gaussian, gaussian_std: 1.5, ..Process::paper(Schedule::vp(1)) };
+    f.levels = [1; SAMPLES];
+    f
 }
 
 fn draw(stage: usize, sample: usize, out: &mut [f64]) {
@@ -77,7 +88,7 @@ impl Fixture {
         let mut dual_gradient = vec![0.0; self.dual_parameters.len()];
         let judges =
             Judges { critic: (&self.critic, &self.critic_parameters), dual: (&self.dual, &self.dual_parameters) };
-        let noise = ActorNoise { levels: &LEVELS, cloning: &self.cloning, chain: &draw };
+        let noise = ActorNoise { levels: &self.levels, cloning: &self.cloning, chain: &draw };
         let batch = (&self.batch, SAMPLES);
         let loss = self.actor.forward(parameters, judges, batch, &noise, &mut tape);
         let gradients = (&mut gradient[..], &mut dual_gradient[..]);
@@ -106,13 +117,41 @@ fn the_one_step_gradient_is_that_of_finite_differences() {
     fixture(PolicyGradient::OneStep).check();
 }
 
+#[test]
+fn the_gradients_of_a_gaussian_policy_are_those_of_finite_differences() {
+    gaussian(PolicyGradient::Full).check();
+    gaussian(PolicyGradient::OneStep).check();
+}
+
+/// `a = clip(mean(s, kappa) + std z)`: the mean is what is cloned, and does not see `z`.
+#[test]
+fn a_gaussian_policy_is_its_mean_plus_noise() {
+    let mut f = gaussian(PolicyGradient::Full);
+    f.actor.process.gaussian_std = 0.0;
+    let mean = f.backward(&f.parameters).2.action;
+    f.actor.process.gaussian_std = 0.3;
+    let (loss, _, tape) = f.backward(&f.parameters);
+    for sample in 0..SAMPLES {
+        let mut noise = [0.0; 2];
+        draw(0, sample, &mut noise);
+        for row in 0..2 {
+            let expected = (mean[(row, sample)] + 0.3 * noise[row]).clamp(-1.0, 1.0);
+            assert!((tape.action[(row, sample)] - expected).abs() < 1e-12);
+        }
+    }
+    assert!(mean.iter().all(|entry| entry.abs() < 1.0), "no mean is clipped, so the loss is that of the actions");
+    let error = |sample: usize| (mean.column(sample) - f.batch.action.column(sample)).norm_squared();
+    let expected: f64 = f.batch.weight.iter().enumerate().map(|(sample, weight)| weight * error(sample)).sum();
+    assert!((loss.cloning - expected).abs() < 1e-12);
+}
+
 /// Through all its steps a chain has a gradient of finite differences (above);
 /// one that starts where the last steps start has the gradient of those alone.
 #[test]
 fn the_last_steps_have_the_gradient_of_a_chain_that_starts_there() {
     let f = fixture(PolicyGradient::Full);
     let denoiser = &f.actor.denoiser;
-    let steps: Vec<_> = f.actor.schedule.chain(Sampler::Ddpm, STEPS).collect();
+    let steps = f.actor.process.chain(Sampler::Ddpm, STEPS);
     let seed = DMatrix::from_vec(2, SAMPLES, fill(2 * SAMPLES, 14));
     let run = |steps: &[_], last: usize, draw: &Draw<'_, f64>| {
         let mut context = denoiser.context(SAMPLES);
@@ -171,7 +210,7 @@ fn a_sample_weight_scales_its_cloning_loss() {
 /// `N(0.2, 0.04)`: every step is linear in the noise, so they follow exactly.
 fn moments_with_the_exact_score(sampler: Sampler, steps: usize) -> (f64, f64) {
     let (target_mean, target_variance) = (0.2, 0.04);
-    let schedule = VpSchedule::new(steps);
+    let schedule = Schedule::vp(steps);
     schedule.chain(sampler, steps).fold((0.0, 1.0), |(mean, variance), step| {
         let alpha_bar = schedule.alpha_bar(step.n);
         // E[x0 | a] = mu + gain (a - sqrt(abar) mu)

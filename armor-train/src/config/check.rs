@@ -3,7 +3,7 @@
 use armor_core::schedule::MAX_STEPS;
 
 use super::{Config, ConfigError};
-use crate::actor::PolicyGradient;
+use crate::actor::{Family, PolicyGradient};
 
 impl Config {
     /// Whether every option lies in its range.
@@ -53,6 +53,8 @@ impl Config {
         let not_negative = [
             ("dual_slack", self.dual_slack),
             ("dual_decay", self.dual_decay),
+            ("temperature", self.temperature),
+            ("gaussian_std", self.gaussian_std),
             ("gradient_clip", self.gradient_clip),
             ("counterfactual_tolerance", self.counterfactual_tolerance),
         ];
@@ -77,6 +79,8 @@ impl Config {
         )?;
         let is_code = self.time_code >= 4 && self.time_code.is_multiple_of(2) && self.time_code <= 1024;
         require("time_code", is_code, "even and between 4 and 1024")?;
+        let is_gaussian = self.policy == Family::Gaussian;
+        require("diffusion_steps", !is_gaussian || self.diffusion_steps == 1, "1 where policy is gaussian")?;
         let last_k = 1..=self.diffusion_steps;
         let is_last_k = self.policy_gradient == PolicyGradient::LastK;
         require(
@@ -116,7 +120,7 @@ mod tests {
             config.set(bad).unwrap();
             let error = config.check().unwrap_err().to_string();
             let key = bad.split('=').next().unwrap();
-            assert!(error.contains(key) || bad.starts_with("diffusion"), "{error}");
+            assert!(error.contains(key) || ["diffusion_steps", "policy"].contains(&key), "{error}");
         }
     }
 }

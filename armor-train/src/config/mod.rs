@@ -8,10 +8,10 @@ mod preset;
 
 use std::path::PathBuf;
 
-use armor_core::schedule::Sampler;
+use armor_core::schedule::{Noising, Sampler};
 use serde::{Deserialize, Serialize};
 
-use crate::actor::{CloningNorm, Guidance, PolicyGradient};
+use crate::actor::{CloningNorm, Family, Guidance, PolicyGradient, ReverseVariance};
 use crate::critic::{CostHeads, CostOutput, Trunk, TwinLoss};
 use crate::dual::DualClip;
 use crate::pcgrad::{Order, Pooling};
@@ -49,8 +49,18 @@ pub struct Config {
     /// Whether the networks see states with mean 0 and variance 1 (O-5).
     pub normalize_states: bool,
 
+    /// What the policy's distribution is; a diffusion in the paper (section 4.5).
+    pub policy: Family,
     /// Denoising steps `N` (Table 2).
     pub diffusion_steps: usize,
+    /// How fast an action is noised (O-25).
+    pub noise_schedule: Noising,
+    /// Variance of a DDPM step (O-27).
+    pub reverse_variance: ReverseVariance,
+    /// Factor on the noise that DDPM steps add (O-27).
+    pub temperature: f64,
+    /// Standard deviation of a Gaussian policy, in units of the action's bounds.
+    pub gaussian_std: f64,
     /// Units of the denoiser's three hidden layers (Appendix B).
     pub hidden: usize,
     /// Hidden units of the kappa embedding (O-8).

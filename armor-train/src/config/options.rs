@@ -43,7 +43,21 @@ pub const OPTIONS: [(&str, &[Entry]); 5] = [
     (
         "Networks",
         &[
+            (
+                "policy",
+                "what the policy's distribution is: `diffusion`, or `gaussian`, a single step around the network's answer, which needs diffusion_steps = target_steps = 1 (section 4.5)",
+            ),
             ("diffusion_steps", "denoising steps N of the policy (Eq. 11, Table 2)"),
+            (
+                "noise_schedule",
+                "noise schedule: `vp`, variance-preserving with beta from 0.1 to 10, or `cosine` (O-25)",
+            ),
+            (
+                "reverse_variance",
+                "variance of a DDPM step: `posterior`, or `beta`, the larger one of the forward step (O-27)",
+            ),
+            ("temperature", "factor on the noise that DDPM steps add; below 1 the policy is less random (O-27)"),
+            ("gaussian_std", "standard deviation of a gaussian policy, in units of the action's bounds"),
             ("hidden", "units of the denoiser's three hidden layers (Appendix B)"),
             ("kappa_hidden", "hidden units of the kappa embedding, whose width the paper leaves open (O-8)"),
             ("kappa_embedding", "entries of the kappa embedding (O-8)"),

@@ -1,10 +1,10 @@
 //! Named sets of choices.
 
-use armor_core::schedule::Sampler;
+use armor_core::schedule::{Noising, Sampler};
 use serde::{Deserialize, Serialize};
 
 use super::Config;
-use crate::actor::{CloningNorm, Guidance, PolicyGradient};
+use crate::actor::{CloningNorm, Family, Guidance, PolicyGradient, ReverseVariance};
 use crate::critic::{CostHeads, CostOutput, Trunk, TwinLoss};
 use crate::dual::DualClip;
 use crate::pcgrad::{Order, Pooling};
@@ -45,7 +45,12 @@ impl Preset {
             cost_scale: 1.0,
             kappa_scale: 1.0,
             normalize_states: false,
+            policy: Family::Diffusion,
             diffusion_steps: 20,
+            noise_schedule: Noising::Vp,
+            reverse_variance: ReverseVariance::Posterior,
+            temperature: 1.0,
+            gaussian_std: 0.1,
             hidden: 256,
             kappa_hidden: 32,
             kappa_embedding: 16,

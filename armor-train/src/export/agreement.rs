@@ -50,7 +50,7 @@ pub fn agreement(
     let kappa: Vec<f32> = kappas.iter().map(|kappa| (f64::from(kappa.to_f32()) * cost_scale) as f32).collect();
     let mut context = actor.denoiser.context(rows.len());
     actor.denoiser.prepare(parameters, &state, &kappa, &mut context);
-    let steps = actor.schedule.chain(Sampler::Ddpm, actor.schedule.steps).collect();
+    let steps = actor.process.chain(Sampler::Ddpm, actor.process.schedule.steps);
     let mut chain = Chain::new(&actor.denoiser, steps, rows.len(), 0);
     chain.run(&actor.denoiser, parameters, &context, &|stage, sample, out: &mut [f32]| {
         Noise::new(sample as u64).fill_normal(stage as u32, 0, out);

@@ -118,7 +118,7 @@ fn manifest<'a>(checkpoint: &'a Checkpoint, actor: &Actor, data: &Dataset) -> Ma
             scale: (config.cost_scale * config.kappa_scale) as f32,
             trained_max: Cost::from_incurred(data.max_kappa()).unwrap_or(Cost::MAX),
         },
-        schedule: actor.schedule,
+        schedule: actor.process.schedule,
         rungs: ladder(shape.steps),
         provenance: Provenance {
             version: env!("CARGO_PKG_VERSION"),

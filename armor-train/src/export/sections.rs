@@ -42,7 +42,7 @@ pub(super) fn sections(
         SectionKind::Hidden3 => layer(&body[1]),
         SectionKind::Output => layer(&body[2]),
         SectionKind::Chain => {
-            let chain = |rung: &Rung| actor.schedule.chain(rung.sampler, rung.steps.into());
+            let chain = |rung: &Rung| actor.process.chain(rung.sampler, rung.steps.into());
             rungs.iter().flat_map(chain).flat_map(|step| step.to_f32().to_words()).collect()
         }
         SectionKind::Golden => golden.to_vec(),

@@ -105,6 +105,30 @@ fn a_run_is_trained_exported_and_scored() {
     assert_eq!(bench.bytes("again.armor"), bench.bytes("policy.armor"));
 }
 
+/// Whatever the policy's distribution is, the image flies it, and an independent program in f64 agrees.
+#[test]
+fn every_kind_of_policy_flies() {
+    let bench = Bench::new();
+    let gaussian = ["policy=gaussian", "diffusion_steps=1", "target_steps=1"];
+    for (name, options, rungs) in [
+        ("gaussian", &gaussian[..], 1),
+        ("cosine", &["noise_schedule=cosine", "diffusion_steps=20"], 5),
+        ("beta", &["reverse_variance=beta", "temperature=0.5"], 3),
+    ] {
+        let set = options.iter().flat_map(|option| ["--set".to_owned(), (*option).to_owned()]);
+        bench.success(&ball_run(name, 20).into_iter().chain(set).collect::<Vec<_>>());
+        let image = format!("{name}.armor");
+        let report = bench.json(&["export", name, "-o", &image]);
+        assert!(report["agreement_max_abs"].as_f64().unwrap() <= 1e-4, "{report}");
+        let bytes = firmware_sim::memory::AlignedBytes::read(&bench.path(&image)).unwrap();
+        assert_eq!(firmware_sim::verify::verify(bytes.as_slice(), 0).failures(), 0, "{name}");
+        let policy = armor_core::image::PolicyImage::new_checked(bytes.as_slice()).unwrap();
+        assert_eq!(policy.manifest().rungs.len(), rungs);
+        let flights = bench.json(&["evaluate", &image, "--task", "ball-run", "--episodes", "2"]);
+        assert_eq!(flights["flights"][0]["faults"], 0);
+    }
+}
+
 #[test]
 fn a_task_of_the_users_own_is_trained_and_exported_in_any_size() {
     let bench = Bench::new();

@@ -1,5 +1,5 @@
 use armor_core::image::SectionKind;
-use armor_core::schedule::VpSchedule;
+use armor_core::schedule::Schedule;
 use armor_core::units::CostLimit;
 use armor_infer::Policy;
 
@@ -48,7 +48,7 @@ fn the_deterministic_chain_of_a_constant_network_has_a_closed_form() {
     let chain = with_image(&parts, |image| Reference::new(image).chain(1, &STATE, Cost::ZERO, SEED, 3));
     let mut start = [0.0; 2];
     Noise::new(SEED).fill_normal(0, 3, &mut start);
-    let abar = VpSchedule::new(5).alpha_bar(5);
+    let abar = Schedule::vp(5).alpha_bar(5);
     for (entry, start) in start.into_iter().map(f64::from).enumerate() {
         let expected = (start - 0.5 * (1.0 - abar).sqrt()) / abar.sqrt();
         assert!((chain.action[entry] - expected).abs() < 1e-5 * expected.abs(), "{chain:?}");
@@ -62,7 +62,7 @@ fn the_deterministic_chain_of_a_constant_network_has_a_closed_form() {
 fn each_row_follows_from_the_one_before_by_eq_12() {
     let parts = Parts::random("ball-run", BALL_RUN, 1);
     let chain = with_image(&parts, |image| Reference::new(image).chain(0, &STATE, Cost::ZERO, SEED, 0));
-    let schedule = VpSchedule::new(5);
+    let schedule = Schedule::vp(5);
     let mut before = chain.start.clone();
     for row in &chain.steps {
         let (here, there) = (schedule.alpha_bar(row.n), schedule.alpha_bar(row.n - 1));

@@ -98,7 +98,7 @@ fn every_rung_is_the_trainers_chain_along_a_falling_budget() {
         Noise::new(trace.seed).fill_normal(stage as u32, tick as u64, out);
     };
     for (index, rung) in image.manifest().rungs.iter().enumerate() {
-        let steps = actor.schedule.chain(rung.sampler, rung.steps.into()).collect();
+        let steps = actor.process.chain(rung.sampler, rung.steps.into());
         let mut chain = Chain::new(&actor.denoiser, steps, rows.len(), 0);
         chain.run(&actor.denoiser, parameters, &context, &draw);
         let loaded = Policy::load(&image).unwrap();
