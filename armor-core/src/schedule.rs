@@ -222,10 +222,10 @@ mod tests {
     #[test]
     fn the_cosine_schedule_is_the_publications() {
         for (n, expected) in [
-            (1, 0.99200727868421856),
+            (1, 0.992_007_278_684_218_6),
             (10, 0.49384359044063775),
             (19, 0.006059644621451166),
-            (20, 6.0596446214511716e-06),
+            (20, 6.059_644_621_451_172e-6),
         ] {
             close(Schedule::cosine(20).alpha_bar(n), expected, 1e-12);
         }
