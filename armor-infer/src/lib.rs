@@ -13,7 +13,7 @@
 //! | Appendix B, the denoiser | `denoiser.rs` |
 //! | its matrix-vector products, in one order | `kernel/` |
 //! | - (the wire to a robot or its simulator, `docs/link.md`) | `link/` |
-//! | the budget across resets, in flash | `journal.rs` |
+//! | - (the budget across resets, in flash) | `journal.rs`, `log.rs` |
 //!
 //! Words: a *policy* is a trained network and its chains, in flash; *kappa* is
 //! the cost that may still be incurred in this episode; a *chain* is a run of
@@ -61,6 +61,7 @@ pub mod golden;
 pub mod journal;
 mod kernel;
 pub mod link;
+pub mod log;
 mod policy;
 mod sampler;
 

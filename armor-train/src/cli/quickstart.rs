@@ -168,7 +168,11 @@ fn flash_and_boot(image: &[u8], path: &Path) -> Result<firmware_sim::chip::Boot,
     let mut chip = if path.exists() { Chip::read(path)? } else { Chip::blank() };
     chip.flash(image, None)?;
     chip.write(path)?;
-    Ok(Chip::read(path)?.boot()?)
+    let mut chip = Chip::read(path)?;
+    let boot = chip.boot()?;
+    chip.confirm()?;
+    chip.write(path)?;
+    Ok(boot)
 }
 
 impl fmt::Display for SeedReport {

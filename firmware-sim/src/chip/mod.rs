@@ -1,41 +1,59 @@
-//! A simulated chip: flash with two policy slots and a boot record, kept in a file.
+//! A simulated chip: flash with a boot log and two policy slots, kept in a file.
 //!
 //! ```text
-//! sector 0     boot record: magic, version, length, checksum, which slot is active
-//! then         slot A, slot B: an image each, from the slot's first byte on
+//! blocks 0, 1    boot log: which slot boots, and how far its trial has come
+//! blocks 2..10   budget journal
+//! then           slot A, slot B: an image each, from the slot's first byte on
 //! ```
 //!
-//! Flash is erased to 0xFF in sectors. Nothing that does not check, or whose
-//! golden trace does not replay, is ever written to a slot; and a chip whose
-//! active slot has gone bad boots the other one, if that is good, and says so.
+//! An update goes to the slot that holds no confirmed policy, is read back, and
+//! then tried: the log says so in a single record, so that power may be cut at
+//! any write or erase and the old policy boots, or the new one, whole. Nothing
+//! that does not check, whose golden trace does not replay, or that is for
+//! another task is ever written; and where the active slot has gone bad, the
+//! other one boots, if that is good, and the log keeps the reason.
 
 mod boot;
-mod record;
+mod boot_log;
+mod header;
 
+use std::ops::Range;
 use std::path::Path;
 
-use serde::{Deserialize, Serialize};
+use armor_core::image::PolicyImage;
+use embedded_storage::nor_flash::{NorFlash, ReadNorFlash};
+use serde::Serialize;
 use thiserror::Error;
 
 use crate::file::{self, FileError};
+use crate::flash::{ERASE_BYTES, FlashFault, NorModel, WRITE_BYTES};
 use crate::host::{self, Unfit};
 use crate::memory::AlignedBytes;
-use record::BootRecord;
+use boot_log::Entry;
+use header::HEADER_BYTES;
 
 pub use boot::{Boot, BootError, SlotFault};
-pub use record::RecordError;
+pub use boot_log::Reason;
+pub use header::HeaderError;
 
+/// Erase blocks of the simulated flash.
+const BLOCKS: usize = 512;
 /// Size of the simulated flash.
-pub const FLASH_BYTES: usize = 2 * 1024 * 1024;
-/// Flash is erased in sectors of this size.
-const SECTOR_BYTES: usize = 4096;
-/// What an image may take: half of what the boot record leaves, in whole sectors.
-pub const SLOT_BYTES: usize = (FLASH_BYTES - SECTOR_BYTES) / 2 / SECTOR_BYTES * SECTOR_BYTES;
+pub const FLASH_BYTES: usize = BLOCKS * ERASE_BYTES;
+/// Size of a chip file.
+pub const FILE_BYTES: usize = HEADER_BYTES + FLASH_BYTES;
+/// Erase blocks of the budget journal.
+const JOURNAL_BLOCKS: usize = 8;
+/// Where the budget journal lies in flash.
+pub const JOURNAL: Range<u32> =
+    (boot_log::BLOCKS * ERASE_BYTES) as u32..((boot_log::BLOCKS + JOURNAL_BLOCKS) * ERASE_BYTES) as u32;
+/// What an image may take: half of what the logs leave, in whole blocks.
+pub const SLOT_BYTES: usize = (BLOCKS - boot_log::BLOCKS - JOURNAL_BLOCKS) / 2 * ERASE_BYTES;
 /// What erased flash reads.
 const ERASED: u8 = 0xFF;
 
 /// One of the two places for an image.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, clap::ValueEnum)]
 #[serde(rename_all = "snake_case")]
 pub enum Slot {
     /// The first.
@@ -47,8 +65,7 @@ pub enum Slot {
 /// A chip with its flash.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Chip {
-    flash: AlignedBytes,
-    record: BootRecord,
+    flash: NorModel,
 }
 
 /// Why a chip file cannot be used.
@@ -58,25 +75,25 @@ pub enum ChipError {
     #[error(transparent)]
     File(#[from] FileError),
     /// The file is too short or too long.
-    #[error("{path} is {actual} bytes and a chip file {FLASH_BYTES}; it was cut or is another file, flash a new chip")]
+    #[error("{path} is {actual} bytes and a chip file {FILE_BYTES}; it was cut or is another file, flash a new chip")]
     Size {
         /// The file.
         path: String,
         /// Its size.
         actual: usize,
     },
-    /// The boot record cannot be read.
+    /// The header cannot be read.
     #[error("{path}: {error}")]
-    Record {
+    Header {
         /// The file.
         path: String,
         /// What is wrong.
-        error: RecordError,
+        error: HeaderError,
     },
 }
 
-/// Why an image was not flashed; the chip is as it was.
-#[derive(Clone, Copy, Debug, PartialEq, Error)]
+/// Why an image was not flashed; what booted before still boots.
+#[derive(Clone, Debug, PartialEq, Error)]
 pub enum FlashError {
     /// The image is longer than a slot.
     #[error("the image is {bytes} bytes and a slot {SLOT_BYTES}; export a smaller network")]
@@ -87,12 +104,35 @@ pub enum FlashError {
     /// The image must not fly.
     #[error("refused to flash: {0}")]
     Unfit(#[from] Unfit),
+    /// The chip flies another task.
+    #[error("the chip flies {flown} and the image is for {image}; flash it to a chip of its own")]
+    WrongTask {
+        /// Task of the policy that boots.
+        flown: String,
+        /// Task of the image.
+        image: String,
+    },
+    /// The slot named holds the policy to go back to.
+    #[error("slot {slot} holds the confirmed policy, which stays until another is confirmed; leave out the slot")]
+    Confirmed {
+        /// The slot.
+        slot: Slot,
+    },
+    /// The flash failed.
+    #[error("the flash failed: {0}")]
+    Flash(#[from] FlashFault),
+    /// What was written is not what is read back.
+    #[error("slot {slot} does not hold what was written to it; the flash is worn out, replace the chip")]
+    ReadBack {
+        /// The slot.
+        slot: Slot,
+    },
 }
 
 /// An image that was flashed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Flashed {
-    /// Where it lies; the slot that boots from now on.
+    /// Where it lies; the slot that is tried at the next boot.
     pub slot: Slot,
     /// Length of the image.
     pub image_bytes: usize,
@@ -112,8 +152,8 @@ impl Slot {
     /// Offset of the slot in flash.
     const fn start(self) -> usize {
         match self {
-            Self::A => SECTOR_BYTES,
-            Self::B => SECTOR_BYTES + SLOT_BYTES,
+            Self::A => JOURNAL.end as usize,
+            Self::B => JOURNAL.end as usize + SLOT_BYTES,
         }
     }
 }
@@ -128,9 +168,9 @@ impl std::fmt::Display for Slot {
 }
 
 impl Chip {
-    /// A chip with erased slots.
+    /// A new chip, all erased.
     pub fn blank() -> Self {
-        Self { flash: AlignedBytes::filled(ERASED, FLASH_BYTES), record: BootRecord { active: None } }
+        Self { flash: NorModel::erased(BLOCKS) }
     }
 
     /// Reads a chip file.
@@ -138,15 +178,16 @@ impl Chip {
     /// # Errors
     /// [`ChipError`]
     pub fn read(path: &Path) -> Result<Self, ChipError> {
-        let flash = AlignedBytes::read(path)?;
+        let bytes = file::read(path)?;
         let name = || path.display().to_string();
         // The magic first: a file of another kind is best called that.
-        let record = BootRecord::read(flash.as_slice()).map_err(|error| ChipError::Record { path: name(), error })?;
-        let actual = flash.as_slice().len();
-        if actual != FLASH_BYTES {
-            return Err(ChipError::Size { path: name(), actual });
-        }
-        Ok(Self { flash, record })
+        let wear = header::read(&bytes).map_err(|error| ChipError::Header { path: name(), error })?;
+        let actual = bytes.len();
+        let flash = bytes.get(HEADER_BYTES..FILE_BYTES).filter(|_| actual == FILE_BYTES);
+        let flash = flash.ok_or_else(|| ChipError::Size { path: name(), actual })?;
+        let flash = NorModel::restored(AlignedBytes::from(flash), wear);
+        let flash = flash.ok_or_else(|| ChipError::Header { path: name(), error: HeaderError::Damaged })?;
+        Ok(Self { flash })
     }
 
     /// Writes the chip file, aside and renamed.
@@ -154,13 +195,11 @@ impl Chip {
     /// # Errors
     /// [`FileError`]
     pub fn write(&self, path: &Path) -> Result<(), FileError> {
-        let mut flash = self.flash.clone();
-        self.record.write(&mut flash.as_mut_slice()[..SECTOR_BYTES]);
-        file::write(path, flash.as_slice())
+        file::write(path, &[&header::bytes(self.flash.wear()), self.flash.bytes()].concat())
     }
 
-    /// Puts an image into a slot and makes that slot the one that boots; the
-    /// slot that does not boot now, where none is named. `bytes` start at a
+    /// Puts an image into a slot, to be tried at the next boot: the one that
+    /// holds no confirmed policy, where none is named. `bytes` start at a
     /// multiple of 16.
     ///
     /// # Errors
@@ -171,21 +210,59 @@ impl Chip {
         if image.len() > SLOT_BYTES {
             return Err(FlashError::TooLarge { bytes: image.len() });
         }
-        let slot = slot.unwrap_or(self.record.active.map_or(Slot::A, Slot::other));
-        let memory = &mut self.flash.as_mut_slice()[slot.start()..][..SLOT_BYTES];
-        memory.fill(ERASED);
-        memory[..image.len()].copy_from_slice(image);
-        self.record.active = Some(slot);
+        let entry = boot_log::latest(&mut self.flash)?;
+        if let Some(flown) = self.task(entry)
+            && flown != checked.image.manifest().task
+        {
+            return Err(FlashError::WrongTask { flown, image: checked.image.manifest().task.into() });
+        }
+        let spare = entry.map_or(Slot::A, Entry::spare);
+        let slot = slot.unwrap_or(spare);
+        if entry.is_some() && slot != spare {
+            return Err(FlashError::Confirmed { slot });
+        }
+        self.program(slot, image)?;
+        boot_log::append(&mut self.flash, Entry::Trial(slot))?;
         Ok(Flashed { slot, image_bytes: image.len(), golden_rows: checked.golden_rows })
     }
 
+    /// Erases what is not erased of a slot, writes an image to it, and reads it back.
+    fn program(&mut self, slot: Slot, image: &[u8]) -> Result<(), FlashError> {
+        let start = slot.start();
+        for block in (start..start + SLOT_BYTES).step_by(ERASE_BYTES) {
+            if self.flash.bytes()[block..][..ERASE_BYTES].iter().any(|&byte| byte != ERASED) {
+                self.flash.erase(block as u32, (block + ERASE_BYTES) as u32)?;
+            }
+        }
+        let mut words = image.to_vec();
+        words.resize(image.len().next_multiple_of(WRITE_BYTES), ERASED);
+        self.flash.write(start as u32, &words)?;
+        let mut written = vec![0; words.len()];
+        self.flash.read(start as u32, &mut written)?;
+        if written == words { Ok(()) } else { Err(FlashError::ReadBack { slot }) }
+    }
+
+    /// The task of the policy that boots, where one does.
+    fn task(&self, entry: Option<Entry>) -> Option<String> {
+        let image = PolicyImage::new_checked(self.slot(entry?.active())).ok()?;
+        Some(image.manifest().task.into())
+    }
+
     /// The slot that boots; none on a new chip.
-    pub const fn active(&self) -> Option<Slot> {
-        self.record.active
+    ///
+    /// # Errors
+    /// [`FlashFault`]
+    pub fn active(&mut self) -> Result<Option<Slot>, FlashFault> {
+        Ok(boot_log::latest(&mut self.flash)?.map(Entry::active))
+    }
+
+    /// The flash, to cut its power, flip its bits or keep a journal in it.
+    pub const fn flash_mut(&mut self) -> &mut NorModel {
+        &mut self.flash
     }
 
     fn slot(&self, slot: Slot) -> &[u8] {
-        &self.flash.as_slice()[slot.start()..][..SLOT_BYTES]
+        &self.flash.bytes()[slot.start()..][..SLOT_BYTES]
     }
 }
 

@@ -15,13 +15,21 @@ fn flashed(seeds: &[u64]) -> Chip {
     let mut chip = Chip::blank();
     for &seed in seeds {
         chip.flash(image(seed).as_slice(), None).unwrap();
+        chip.boot().unwrap();
+        chip.confirm().unwrap();
     }
     chip
 }
 
+/// What boots, and nothing else.
+fn booted(chip: &mut Chip) -> (Slot, AlignedBytes) {
+    let boot = chip.boot().unwrap();
+    (boot.slot, boot.image)
+}
+
 /// Flips one bit of the image in a slot.
 fn damage(chip: &mut Chip, slot: Slot) {
-    chip.flash.as_mut_slice()[slot.start() + HEADER_BYTES + 5] ^= 1;
+    chip.flash.flip(8 * (slot.start() + HEADER_BYTES + 5));
 }
 
 #[test]
@@ -32,20 +40,99 @@ fn what_was_flashed_boots_bit_for_bit_after_the_file_was_read_back() {
     let report = chip.flash(image(1).as_slice(), None).unwrap();
     assert_eq!(report, Flashed { slot: Slot::A, image_bytes: image(1).as_slice().len(), golden_rows: GOLDEN_ROWS });
     chip.write(&path).unwrap();
-    assert_eq!(fs::metadata(&path).unwrap().len(), FLASH_BYTES as u64);
+    assert_eq!(fs::metadata(&path).unwrap().len(), FILE_BYTES as u64);
     let boot = Chip::read(&path).unwrap().boot().unwrap();
-    assert_eq!(boot, Boot { slot: Slot::A, image: image(1), golden_rows: GOLDEN_ROWS, passed_over: None });
+    let expected = Boot { slot: Slot::A, image: image(1), golden_rows: GOLDEN_ROWS, on_trial: true, passed_over: None };
+    assert_eq!(boot, expected);
 }
 
 #[test]
-fn flashing_takes_turns_unless_a_slot_is_named() {
+fn an_update_goes_to_the_slot_without_a_confirmed_policy() {
     let mut chip = flashed(&[1]);
     assert_eq!(chip.flash(image(2).as_slice(), None).unwrap().slot, Slot::B);
-    assert_eq!(chip.boot().unwrap().image, image(2));
-    assert_eq!(chip.flash(image(3).as_slice(), Some(Slot::B)).unwrap().slot, Slot::B);
-    assert_eq!(chip.boot().unwrap().image, image(3));
-    assert_eq!(chip.flash(image(4).as_slice(), None).unwrap().slot, Slot::A);
-    assert_eq!(chip.boot().unwrap().image, image(4));
+    // Not yet confirmed, it is what the next update replaces.
+    assert_eq!(chip.flash(image(3).as_slice(), None).unwrap().slot, Slot::B);
+    assert_eq!(booted(&mut chip), (Slot::B, image(3)));
+    chip.confirm().unwrap();
+    let refused = chip.flash(image(4).as_slice(), Some(Slot::B));
+    assert_eq!(refused, Err(FlashError::Confirmed { slot: Slot::B }));
+    assert_eq!(chip.flash(image(4).as_slice(), Some(Slot::A)).unwrap().slot, Slot::A);
+    assert_eq!(booted(&mut chip), (Slot::A, image(4)));
+}
+
+#[test]
+fn a_trial_that_is_not_confirmed_is_rolled_back_and_the_reason_stays() {
+    let mut chip = flashed(&[1]);
+    chip.flash(image(2).as_slice(), None).unwrap();
+    let trial = chip.boot().unwrap();
+    assert_eq!((trial.slot, trial.on_trial, trial.passed_over), (Slot::B, true, None));
+    // A reset before it was confirmed.
+    for fault in [SlotFault::NotConfirmed, SlotFault::RolledBack(Reason::NotConfirmed)] {
+        let boot = chip.boot().unwrap();
+        assert_eq!((boot.slot, boot.image, boot.on_trial), (Slot::A, image(1), false));
+        assert_eq!(boot.passed_over, Some(fault));
+    }
+    assert_eq!(chip.flash(image(3).as_slice(), None).unwrap().slot, Slot::B);
+    assert_eq!(booted(&mut chip), (Slot::B, image(3)));
+}
+
+#[test]
+fn a_trial_with_nothing_to_go_back_to_is_repeated() {
+    let mut chip = Chip::blank();
+    chip.flash(image(1).as_slice(), None).unwrap();
+    for _ in 0..3 {
+        let boot = chip.boot().unwrap();
+        assert_eq!((boot.slot, boot.image, boot.on_trial), (Slot::A, image(1), true));
+    }
+    chip.confirm().unwrap();
+    assert!(!chip.boot().unwrap().on_trial);
+}
+
+#[test]
+fn an_image_for_another_task_is_refused() {
+    let mut chip = flashed(&[1]);
+    let other = AlignedBytes::from(Parts::random("ball-circle", BALL_RUN, 2).with_golden().bytes().as_slice());
+    let refused = chip.flash(other.as_slice(), None).unwrap_err().to_string();
+    assert!(refused.contains("the chip flies ball-run and the image is for ball-circle"), "{refused}");
+}
+
+/// Power is cut at every write and erase of an update over an older image, and
+/// of the boots after it. Whatever is cut, the next boot flies the old policy
+/// or the new one, bit for bit; and a second try of the update gets through.
+#[test]
+fn an_update_survives_a_power_cut_at_every_operation() {
+    let (old, new) = (image(2), image(3));
+    // Slot A holds the oldest policy, which the update erases; B the old one.
+    let before = flashed(&[1, 2]);
+    let update = |chip: &mut Chip| -> Result<(), Box<dyn std::error::Error>> {
+        chip.flash(new.as_slice(), None)?;
+        chip.boot()?;
+        Ok(chip.confirm()?)
+    };
+    let mut whole = before.clone();
+    update(&mut whole).unwrap();
+    let operations = whole.flash.operations() - before.flash.operations();
+    assert!(operations > (new.as_slice().len() / WRITE_BYTES) as u64);
+
+    let mut flown = [0; 2];
+    for cut in 0..operations {
+        let mut chip = before.clone();
+        chip.flash_mut().cut_power_after(cut, cut);
+        update(&mut chip).unwrap_err();
+        // Power fails again at the first operation of the boot, if it has one.
+        chip.flash_mut().restore_power();
+        chip.flash_mut().cut_power_after(0, !cut);
+        let _ = chip.boot();
+        chip.flash_mut().restore_power();
+        let (_, image) = booted(&mut chip);
+        assert!(image == old || image == new, "cut {cut}");
+        flown[usize::from(image == new)] += 1;
+
+        update(&mut chip).unwrap();
+        assert_eq!(booted(&mut chip).1, new, "cut {cut}");
+    }
+    println!("{operations} cut points; the old policy flew after {}, the new one after {}", flown[0], flown[1]);
+    assert!(flown[0] > 0 && flown[1] > 0);
 }
 
 #[test]
@@ -102,23 +189,17 @@ fn what_is_no_chip_file_is_named() {
         fs::write(&path, bytes).unwrap();
         Chip::read(&path).unwrap_err()
     };
-    let record = |error: &ChipError| match error {
-        ChipError::Record { error, .. } => Some(*error),
+    let header = |error: &ChipError| match error {
+        ChipError::Header { error, .. } => Some(*error),
         _ => None,
     };
-    assert_eq!(record(&read(b"")), Some(RecordError::Magic));
-    assert_eq!(record(&read(image(1).as_slice())), Some(RecordError::Magic));
-    for length in [17, SECTOR_BYTES, FLASH_BYTES - 1] {
+    assert_eq!(header(&read(b"")), Some(HeaderError::Magic));
+    assert_eq!(header(&read(image(1).as_slice())), Some(HeaderError::Magic));
+    for length in [17, super::header::HEADER_BYTES, FILE_BYTES - 1] {
         let error = read(&good[..length]);
-        let damaged = record(&error) == Some(RecordError::Damaged);
+        let damaged = header(&error) == Some(HeaderError::Damaged);
         assert!(damaged || matches!(error, ChipError::Size { actual, .. } if actual == length), "{error}");
     }
     assert!(matches!(read(&[good.as_slice(), &[0xFF]].concat()), ChipError::Size { .. }));
-    // Magic, version, length, checksum, record: no flipped bit goes unseen.
-    for bit in 0..8 * 18 {
-        let mut flipped = good.clone();
-        flipped[bit / 8] ^= 1 << (bit % 8);
-        assert!(record(&read(&flipped)).is_some(), "bit {bit}");
-    }
     assert!(matches!(Chip::read(&folder.path().join("none.chip")), Err(ChipError::File(_))));
 }

@@ -9,8 +9,11 @@ use super::output::{CommandResult, Output};
 use crate::chip::{Chip, Flashed, SLOT_BYTES, Slot};
 use crate::image_file::ImageFile;
 
-/// Flash an image to a simulated chip, which is made if there is none, and
-/// make it the one that boots. An image that does not check is refused.
+/// Flash an image to a simulated chip, which is made if there is none, to be
+/// tried at its next boot.
+///
+/// The confirmed policy stays in the other slot until the new one has flown.
+/// An image that does not check, or is for another task, is refused.
 #[derive(Debug, clap::Args)]
 pub(super) struct Flash {
     /// The policy image.
@@ -18,7 +21,7 @@ pub(super) struct Flash {
     /// The chip file.
     #[arg(long)]
     chip: PathBuf,
-    /// Where to put it; the slot that does not boot now, if not given.
+    /// Where to put it; the slot without a confirmed policy, if not given.
     #[arg(long)]
     slot: Option<Slot>,
 }

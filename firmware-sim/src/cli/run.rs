@@ -79,13 +79,21 @@ impl Run {
         let plan =
             FlightPlan { task, limit, episodes: self.episodes, seed: self.seed, rate_hz, max_steps: self.max_steps };
 
-        let boot = Chip::read(&self.chip)?.boot()?;
+        let mut chip = Chip::read(&self.chip)?;
+        let boot = chip.boot();
+        chip.write(&self.chip)?;
+        let boot = boot?;
         if let Some(fault) = boot.passed_over {
             output.note(format_args!("slot {} passed over: {fault}", boot.slot.other()));
         }
         output.note(format_args!("booted slot {}, {} golden rows bit for bit", boot.slot, boot.golden_rows));
         let image = PolicyImage::new_checked(boot.image.as_slice())?;
         let flight = fly(&image, &plan)?;
+        if boot.on_trial {
+            chip.confirm()?;
+            chip.write(&self.chip)?;
+            output.note(format_args!("slot {} flew its trial and is confirmed", boot.slot));
+        }
         if let Some(path) = &self.output {
             file::write(path, telemetry::csv(&flight, task.action).as_bytes())?;
         }

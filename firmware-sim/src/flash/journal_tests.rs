@@ -2,7 +2,8 @@
 
 use armor_core::noise::{Noise, below};
 use armor_core::units::Cost;
-use armor_infer::journal::{Journal, JournalError, Reserve};
+use armor_infer::journal::{Journal, Reserve};
+use armor_infer::log::LogError;
 
 use super::{ERASE_BYTES, FlashFault, NorModel};
 
@@ -34,7 +35,7 @@ impl Robot {
     }
 
     /// Flies `steps`; the limit of episodes that begin is `limit`.
-    fn fly(&mut self, steps: u64, seed: u64, limit: Cost) -> Result<(), JournalError<FlashFault>> {
+    fn fly(&mut self, steps: u64, seed: u64, limit: Cost) -> Result<(), LogError<FlashFault>> {
         let noise = Noise::new(seed);
         let mut incurred = Cost::ZERO;
         for step in 0..steps {
@@ -72,7 +73,7 @@ fn a_power_cut_at_any_operation_never_refills_the_budget() {
         let mut flash = robot.journal.into_flash();
         flash.cut_power_after(cut, cut);
         robot.journal = Journal::open(flash, REGION, reserve(0.5)).unwrap();
-        assert_eq!(robot.fly(STEPS, 7, limit), Err(JournalError::Flash(FlashFault::PowerCut)), "cut {cut}");
+        assert_eq!(robot.fly(STEPS, 7, limit), Err(LogError::Flash(FlashFault::PowerCut)), "cut {cut}");
         let mut flash = robot.journal.into_flash();
         flash.restore_power();
         let after = Robot::boot(flash, 0.5);
@@ -137,7 +138,7 @@ fn a_region_that_is_no_two_blocks_is_refused() {
     let open = |region| Journal::open(NorModel::erased(BLOCKS), region, reserve(0.0)).map(drop);
     let block = ERASE_BYTES as u32;
     for region in [0..block, 16..16 + 2 * block, 0..2 * block + 16, block..4 * block, 2 * block..0] {
-        assert_eq!(open(region.clone()), Err(JournalError::Region), "{region:?}");
+        assert_eq!(open(region.clone()), Err(LogError::Region), "{region:?}");
     }
     assert_eq!(open(block..3 * block), Ok(()));
 }

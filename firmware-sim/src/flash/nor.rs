@@ -90,6 +90,13 @@ impl NorModel {
         }
     }
 
+    /// Flash that holds `bytes`, whole blocks, each erased as often as `wear`
+    /// says; nothing where the two do not fit together.
+    pub fn restored(bytes: AlignedBytes, wear: Vec<u32>) -> Option<Self> {
+        let fits = bytes.as_slice().len() == wear.len() * ERASE_BYTES;
+        fits.then_some(Self { bytes, wear, operations: 0, power: Power::On })
+    }
+
     /// What it holds.
     pub fn bytes(&self) -> &[u8] {
         self.bytes.as_slice()

@@ -60,6 +60,7 @@ fn an_image_is_flashed_and_flown() {
     let bench = Bench::new();
     let flashed = bench.json(&["flash", "policy.armor", "--chip", "robot.chip"]);
     assert_eq!((&flashed["slot"], &flashed["golden_rows"]), (&"a".into(), &GOLDEN_ROWS.into()));
+    bench.json(&RUN);
     let named = bench.json(&["flash", "policy.armor", "--chip", "robot.chip", "--slot", "b"]);
     assert_eq!(named["slot"], "b");
 
@@ -90,6 +91,7 @@ fn a_flight_is_repeated_by_its_seed() {
 #[test]
 fn a_damaged_slot_gives_way_and_the_reason_is_told() {
     let bench = Bench::flashed();
+    bench.json(&RUN);
     bench.json(&["flash", "policy.armor", "--chip", "robot.chip"]);
     let mut chip = fs::read(bench.path("robot.chip")).unwrap();
     let last_image = chip.windows(4).rposition(|window| window == b"ARMR").unwrap();

@@ -62,9 +62,13 @@ fn a_flight_that_does_not_fit_is_refused() {
         ("other-size", Parts::random("ball-run", Shape { state: 9, ..BALL_RUN }, 1), "senses 9 and moves 2 entries"),
     ] {
         bench.put(name, &parts.with_golden().bytes());
-        bench.json(&["flash", name, "--chip", "robot.chip"]);
-        assert!(bench.failure(&RUN).contains(message));
+        bench.json(&["flash", name, "--chip", "other.chip"]);
+        assert!(bench.failure(&["run", "--chip", "other.chip", "--task", "ball-run"]).contains(message));
+        fs::remove_file(bench.path("other.chip")).unwrap();
     }
+    bench.put("circle", &Parts::random("ball-circle", BALL_RUN, 1).with_golden().bytes());
+    let refused = bench.failure(&["flash", "circle", "--chip", "robot.chip"]);
+    assert!(refused.contains("the chip flies ball-run and the image is for ball-circle"), "{refused}");
 }
 
 #[test]

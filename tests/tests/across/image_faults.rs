@@ -122,12 +122,12 @@ fn of_another_size() -> [AlignedBytes; 2] {
     let run = Run::new();
     run.fit(&config, &data, None);
     let bytes = export(&run.checkpoint(), &data).unwrap().bytes;
-    let renamed = renamed(&bytes, "ball-run");
+    let renamed = sealed_anew(&bytes, |manifest| manifest.task = "ball-run");
     [bytes, renamed]
 }
 
-/// The image with another task's name in its manifest, sealed anew.
-pub(crate) fn renamed(bytes: &AlignedBytes, task: &str) -> AlignedBytes {
+/// The image with a changed manifest, sealed anew.
+pub(crate) fn sealed_anew(bytes: &AlignedBytes, change: impl FnOnce(&mut Manifest<'_>)) -> AlignedBytes {
     let image = PolicyImage::new_checked(bytes.as_slice()).unwrap();
     let body = &bytes.as_slice()[front(bytes.as_slice())..];
     let sections: Vec<Vec<u32>> = image
@@ -140,7 +140,8 @@ pub(crate) fn renamed(bytes: &AlignedBytes, task: &str) -> AlignedBytes {
         })
         .collect();
     let contents: [&[u32]; SECTION_COUNT] = std::array::from_fn(|index| &sections[index][..]);
-    let manifest = Manifest { task, ..image.manifest().clone() };
+    let mut manifest = image.manifest().clone();
+    change(&mut manifest);
     let mut out = AlignedBytes::filled(0, bytes.as_slice().len() + 16);
     let length = write(&manifest, &contents, out.as_mut_slice()).unwrap();
     AlignedBytes::from(&out.as_slice()[..length])

@@ -142,7 +142,10 @@ fn every_check_of_the_image_passes() {
 fn what_boots_is_what_was_exported() {
     let image = &policy().exported.bytes;
     let booted = flashed_and_booted(image.as_slice());
-    assert_eq!(booted, Boot { slot: Slot::A, image: image.clone(), golden_rows: 32, passed_over: None });
+    assert_eq!(
+        booted,
+        Boot { slot: Slot::A, image: image.clone(), golden_rows: 32, on_trial: true, passed_over: None }
+    );
 }
 
 #[test]
