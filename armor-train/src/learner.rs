@@ -18,8 +18,9 @@ use crate::stream;
 use crate::update::{CriticMetrics, Worker, update_actor, update_critic, update_target};
 
 /// Samples of a worker's share. A constant, so that the shares, and with them
-/// the order of all sums, do not depend on the machine.
-pub(crate) const SHARE: usize = 128;
+/// the order of all sums, do not depend on the machine; a multiple of the
+/// columns of a product's tile.
+pub(crate) const SHARE: usize = 132;
 
 /// A training run in memory.
 pub struct Learner<'d, T: Scalar> {

@@ -14,7 +14,7 @@ use std::ops::Range;
 use nalgebra::DMatrix;
 
 use crate::nn::{
-    Activation, Linear, Mlp, Operand, Scalar, Tape, Update, keep_columns, product, scale, sinusoidal_code,
+    Activation, Linear, Mlp, Operand, Packed, Scalar, Tape, Update, keep_columns, product, scale, sinusoidal_code,
 };
 
 /// Widths of the network.
@@ -66,6 +66,9 @@ pub struct Context<T: Scalar> {
     /// `W_n e_n`, `H x N`; column `n - 1` for noise level `n`.
     table: DMatrix<T>,
     table_gradient: DMatrix<T>,
+    /// The weights of the body, as every call of the chain reads them, and their transposes.
+    body: Vec<Packed<T>>,
+    body_transposed: Vec<Packed<T>>,
 }
 
 /// One call of the network.
@@ -196,6 +199,8 @@ impl Denoiser {
             constant_gradient: DMatrix::zeros(hidden, samples),
             table: DMatrix::zeros(hidden, steps),
             table_gradient: DMatrix::zeros(hidden, steps),
+            body: Vec::new(),
+            body_transposed: Vec::new(),
         }
     }
 
@@ -235,6 +240,8 @@ impl Denoiser {
         product(table, self.first.block(parameters, of_time), context.time.output().into(), Update::Replace);
         context.constant_gradient.fill(T::zero());
         context.table_gradient.fill(T::zero());
+        context.body = self.body.pack(parameters);
+        context.body_transposed = self.body.pack_transposed(parameters);
     }
 
     /// Predicts the noise in `call.action` at `call.levels`; with `slopes`, a backward pass may follow.
@@ -253,7 +260,7 @@ impl Denoiser {
             &context.table,
             &call.levels,
         );
-        self.body.forward(parameters, &call.hidden, &mut call.body, slopes);
+        self.body.forward_packed((parameters, &context.body), &call.hidden, &mut call.body, slopes);
     }
 
     /// Back-propagates [`Call::noise_gradient`]: adds to `gradient` and to the
@@ -265,8 +272,9 @@ impl Denoiser {
         call: &mut Call<T>,
         gradient: &mut [T],
     ) {
-        let hidden_gradient = &mut call.hidden_gradient;
-        self.body.backward(parameters, &call.hidden, &mut call.body, Some(gradient), Some(hidden_gradient));
+        let Call { hidden, hidden_gradient, body, .. } = call;
+        let weights = &context.body_transposed;
+        self.body.backward_packed(weights, hidden, body, Some(gradient), Some(hidden_gradient));
         let columns = call.kept.len();
         scale(hidden_gradient, &call.hidden_slope, columns);
 

@@ -74,7 +74,7 @@ impl Linear {
     /// Adds the gradient of the bias: the row sums of `delta`.
     pub fn add_bias_gradient<T: Scalar>(&self, gradient: &mut [T], delta: Operand<'_, T>) {
         let bias = self.bias_mut(gradient);
-        for column in delta.columns() {
+        for column in delta.stored_columns() {
             for (sum, &delta) in bias.iter_mut().zip(column) {
                 *sum += delta;
             }

@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::product::{Operand, Update, product};
+use super::product::{Operand, Packed, Update};
 use super::{Activation, Linear, Scalar};
 
 /// Layout of a stack of layers within a parameter vector.
@@ -78,14 +78,35 @@ impl Mlp {
         if layer + 1 < self.layers.len() { Some(self.activation) } else { self.output }
     }
 
+    /// The weights, for many forward passes with the same parameters.
+    pub fn pack<T: Scalar>(&self, parameters: &[T]) -> Vec<Packed<T>> {
+        self.layers.iter().map(|layer| Packed::new(layer.weights(parameters))).collect()
+    }
+
+    /// The transposed weights, for many backward passes with the same parameters.
+    pub fn pack_transposed<T: Scalar>(&self, parameters: &[T]) -> Vec<Packed<T>> {
+        self.layers.iter().map(|layer| Packed::new(layer.weights(parameters).transposed())).collect()
+    }
+
     /// Runs the stack on `input`, `inputs x samples`; with `slopes`, a backward pass may follow.
     pub fn forward<T: Scalar>(&self, parameters: &[T], input: &DMatrix<T>, tape: &mut Tape<T>, slopes: bool) {
+        self.forward_packed((parameters, &self.pack(parameters)), input, tape, slopes);
+    }
+
+    /// As [`Mlp::forward`], with the parameters' [`Mlp::pack`].
+    pub fn forward_packed<T: Scalar>(
+        &self,
+        (parameters, weights): (&[T], &[Packed<T>]),
+        input: &DMatrix<T>,
+        tape: &mut Tape<T>,
+        slopes: bool,
+    ) {
         tape.columns = input.ncols();
-        for (index, layer) in self.layers.iter().enumerate() {
+        for (index, (layer, weights)) in self.layers.iter().zip(weights).enumerate() {
             let (before, rest) = tape.values.split_at_mut(index);
             let input = before.last().unwrap_or(input);
             let values = &mut rest[0];
-            product(values.as_mut_slice(), layer.weights(parameters), input.into(), Update::Replace);
+            weights.multiply(values.as_mut_slice(), input.into(), Update::Replace);
             let bias = layer.bias(parameters);
             match self.activation(index) {
                 Some(activation) => activation.apply(values, slopes.then_some(&mut tape.slopes[index]), bias),
@@ -104,11 +125,23 @@ impl Mlp {
         parameters: &[T],
         input: &DMatrix<T>,
         tape: &mut Tape<T>,
+        gradient: Option<&mut [T]>,
+        input_gradient: Option<&mut DMatrix<T>>,
+    ) {
+        self.backward_packed(&self.pack_transposed(parameters), input, tape, gradient, input_gradient);
+    }
+
+    /// As [`Mlp::backward`], with the parameters' [`Mlp::pack_transposed`].
+    pub fn backward_packed<T: Scalar>(
+        &self,
+        transposes: &[Packed<T>],
+        input: &DMatrix<T>,
+        tape: &mut Tape<T>,
         mut gradient: Option<&mut [T]>,
         input_gradient: Option<&mut DMatrix<T>>,
     ) {
         let columns = tape.columns;
-        for (index, layer) in self.layers.iter().enumerate().rev() {
+        for (index, (layer, weights)) in self.layers.iter().zip(transposes).enumerate().rev() {
             if self.activation(index).is_some() {
                 scale(&mut tape.deltas[index], &tape.slopes[index], columns);
             }
@@ -119,14 +152,12 @@ impl Mlp {
                 layer.add_gradient(gradient, delta, Operand::leading(input, columns));
             }
             if let Some(below) = before.last_mut() {
-                let below = &mut below.as_mut_slice()[..layer.inputs * columns];
-                product(below, layer.weights(parameters).transposed(), delta, Update::Replace);
+                weights.multiply(&mut below.as_mut_slice()[..layer.inputs * columns], delta, Update::Replace);
             }
         }
-        if let (Some(input_gradient), Some(first)) = (input_gradient, self.layers.first()) {
-            let weights = first.weights(parameters).transposed();
+        if let (Some(input_gradient), [first, ..], [weights, ..]) = (input_gradient, &self.layers[..], transposes) {
             let input_gradient = &mut input_gradient.as_mut_slice()[..first.inputs * columns];
-            product(input_gradient, weights, Operand::leading(&tape.deltas[0], columns), Update::Replace);
+            weights.multiply(input_gradient, Operand::leading(&tape.deltas[0], columns), Update::Replace);
         }
     }
 

@@ -9,6 +9,7 @@
 
 mod activation;
 mod adam;
+mod kernel;
 mod linear;
 mod mlp;
 mod product;
@@ -19,7 +20,7 @@ pub use activation::Activation;
 pub use adam::Adam;
 pub use linear::Linear;
 pub use mlp::{Mlp, Tape, keep_columns, scale};
-pub use product::{Operand, Update, product};
+pub use product::{Operand, Packed, Update, product};
 pub use scalar::Scalar;
 pub use sinusoid::sinusoidal_code;
 

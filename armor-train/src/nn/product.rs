@@ -1,21 +1,19 @@
-//! Matrix products by `matrixmultiply`, the crate that nalgebra itself uses
-//! for large products, over pieces of parameter vectors and their transposes.
-//!
-//! nalgebra's own `gemm` is not used: in its path for small matrices it reads
-//! transposed views through a slice that is shorter than the view.
+//! Matrix products over pieces of parameter vectors and their transposes.
 
 use nalgebra::DMatrix;
 
 use super::Scalar;
+use super::kernel::ROWS;
 
-/// A matrix to be read, with any strides.
+/// A matrix to be read: stored column by column, or the transpose of one that is.
 #[derive(Clone, Copy)]
 pub struct Operand<'a, T> {
     values: &'a [T],
-    rows: usize,
-    columns: usize,
-    row_stride: usize,
-    column_stride: usize,
+    /// Length of a stored column.
+    stride: usize,
+    /// Number of stored columns.
+    count: usize,
+    transposed: bool,
 }
 
 impl<'a, T> Operand<'a, T> {
@@ -25,7 +23,7 @@ impl<'a, T> Operand<'a, T> {
     /// Unless there are `rows * columns` values.
     pub fn new(values: &'a [T], rows: usize, columns: usize) -> Self {
         assert_eq!(values.len(), rows * columns, "a matrix has rows times columns values");
-        Self { values, rows, columns, row_stride: 1, column_stride: rows }
+        Self { values, stride: rows, count: columns, transposed: false }
     }
 
     /// The first columns of a matrix.
@@ -36,20 +34,30 @@ impl<'a, T> Operand<'a, T> {
         Self::new(&matrix.as_slice()[..matrix.nrows() * columns], matrix.nrows(), columns)
     }
 
-    /// The columns of a matrix that is not transposed.
-    pub(super) fn columns(self) -> std::slice::ChunksExact<'a, T> {
-        self.values.chunks_exact(self.rows)
-    }
-
     /// The transpose, without moving a number.
     pub fn transposed(self) -> Self {
-        Self {
-            rows: self.columns,
-            columns: self.rows,
-            row_stride: self.column_stride,
-            column_stride: self.row_stride,
-            ..self
-        }
+        Self { transposed: !self.transposed, ..self }
+    }
+
+    const fn rows(&self) -> usize {
+        if self.transposed { self.count } else { self.stride }
+    }
+
+    pub(super) const fn columns(&self) -> usize {
+        if self.transposed { self.stride } else { self.count }
+    }
+
+    pub(super) const fn is_transposed(&self) -> bool {
+        self.transposed
+    }
+
+    /// The columns as they are stored: the rows of a transpose.
+    pub(super) fn stored_columns(self) -> std::slice::ChunksExact<'a, T> {
+        self.values.chunks_exact(self.stride)
+    }
+
+    pub(super) fn stored_column(self, index: usize) -> &'a [T] {
+        &self.values[index * self.stride..(index + 1) * self.stride]
     }
 }
 
@@ -68,28 +76,74 @@ pub enum Update {
     Add,
 }
 
+/// A left factor of many products, copied into the order in which they read it.
+#[derive(Clone, Debug)]
+pub struct Packed<T> {
+    rows: usize,
+    depth: usize,
+    /// Panels of [`ROWS`] rows, one after the other; in a panel the columns follow each other.
+    panels: Vec<[T; ROWS]>,
+}
+
+impl<T: Scalar> Packed<T> {
+    /// A copy of `matrix`.
+    pub fn new(matrix: Operand<'_, T>) -> Self {
+        let (rows, depth) = (matrix.rows(), matrix.columns());
+        let mut panels = Vec::with_capacity(rows.div_ceil(ROWS) * depth);
+        for first in (0..rows).step_by(ROWS) {
+            append_panel(&mut panels, matrix, first);
+        }
+        Self { rows, depth, panels }
+    }
+
+    /// Writes the product of the packed matrix and `b` to `out`, column by column.
+    ///
+    /// # Panics
+    /// Unless the dimensions fit.
+    pub fn multiply(&self, out: &mut [T], b: Operand<'_, T>, update: Update) {
+        check(out, [self.rows, self.depth], b);
+        let panels = self.panels.chunks_exact(self.depth);
+        for (first, panel) in (0..self.rows).step_by(ROWS).zip(panels) {
+            T::multiply_panel(out, (first, self.rows), panel, b, update);
+        }
+    }
+}
+
 /// Writes `a b` to `out`, column by column.
 ///
 /// # Panics
 /// Unless the dimensions fit.
-#[allow(unsafe_code)] // The one call into `matrixmultiply`; its bounds are checked here.
 pub fn product<T: Scalar>(out: &mut [T], a: Operand<'_, T>, b: Operand<'_, T>, update: Update) {
-    assert_eq!(a.columns, b.rows, "inner dimensions agree");
-    assert_eq!(out.len(), a.rows * b.columns, "the result has rows times columns values");
-    let beta = match update {
-        Update::Replace => T::zero(),
-        Update::Add => T::one(),
-    };
-    // SAFETY: `Operand::new` and `transposed` keep `(rows - 1) * row_stride + (columns - 1) *
-    // column_stride < values.len()`, and `out` holds `a.rows * b.columns` values.
-    unsafe {
-        T::gemm(
-            [a.rows, a.columns, b.columns],
-            (a.values.as_ptr(), [a.row_stride as isize, a.column_stride as isize]),
-            (b.values.as_ptr(), [b.row_stride as isize, b.column_stride as isize]),
-            beta,
-            (out.as_mut_ptr(), [1, a.rows as isize]),
-        );
+    check(out, [a.rows(), a.columns()], b);
+    let mut panel = Vec::with_capacity(a.columns());
+    for first in (0..a.rows()).step_by(ROWS) {
+        panel.clear();
+        append_panel(&mut panel, a, first);
+        T::multiply_panel(out, (first, a.rows()), &panel, b, update);
+    }
+}
+
+fn check<T>(out: &[T], [rows, depth]: [usize; 2], b: Operand<'_, T>) {
+    assert_eq!(depth, b.rows(), "inner dimensions agree");
+    assert_eq!(out.len(), rows * b.columns(), "the result has rows times columns values");
+}
+
+/// Copies the rows from `first` on, filled up with zeros, to the end of `panels`.
+fn append_panel<T: Scalar>(panels: &mut Vec<[T; ROWS]>, matrix: Operand<'_, T>, first: usize) {
+    let height = ROWS.min(matrix.rows() - first);
+    if matrix.transposed {
+        let start = panels.len();
+        panels.resize(start + matrix.columns(), [T::zero(); ROWS]);
+        for row in 0..height {
+            for (panel, &value) in panels[start..].iter_mut().zip(matrix.stored_column(first + row)) {
+                panel[row] = value;
+            }
+        }
+    } else {
+        panels.extend(matrix.stored_columns().map(|column| match column[first..].first_chunk() {
+            Some(&rows) => rows,
+            None => std::array::from_fn(|row| if row < height { column[first + row] } else { T::zero() }),
+        }));
     }
 }
 
@@ -100,7 +154,7 @@ mod tests {
 
     #[test]
     fn products_and_transposes_are_those_of_nalgebra() {
-        for [m, k, n] in [[1, 1, 1], [2, 3, 5], [1, 7, 4], [33, 17, 65]] {
+        for [m, k, n] in [[1, 1, 1], [2, 3, 5], [1, 7, 4], [16, 5, 6], [33, 17, 65]] {
             let a = DMatrix::from_vec(m, k, fill(m * k, 1));
             let b = DMatrix::from_vec(k, n, fill(k * n, 2));
             let expected = &a * &b;
@@ -109,11 +163,12 @@ mod tests {
                 (Operand::from(&a), Operand::from(&b)),
                 (Operand::from(&a_t).transposed(), Operand::from(&b)),
                 (Operand::from(&a), Operand::from(&b_t).transposed()),
+                (Operand::from(&a_t).transposed(), Operand::from(&b_t).transposed()),
             ] {
                 let mut out = DMatrix::from_element(m, n, f64::NAN);
                 product(out.as_mut_slice(), a, b, Update::Replace);
                 assert!((&out - &expected).amax() < 1e-12);
-                product(out.as_mut_slice(), a, b, Update::Add);
+                Packed::new(a).multiply(out.as_mut_slice(), b, Update::Add);
                 assert!((&out - 2.0 * &expected).amax() < 1e-12);
             }
         }

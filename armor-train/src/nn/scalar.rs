@@ -3,6 +3,9 @@
 use nalgebra::RealField;
 use serde::{Serialize, de::DeserializeOwned};
 
+use super::kernel::{self, ROWS};
+use super::product::{Operand, Update};
+
 /// f32 to train, f64 to check.
 pub trait Scalar: RealField + Copy + Serialize + DeserializeOwned + 'static {
     /// `mish(x)` and its derivative.
@@ -23,18 +26,16 @@ pub trait Scalar: RealField + Copy + Serialize + DeserializeOwned + 'static {
     fn of(value: f64) -> Self;
     /// The value in double precision.
     fn to_f64(self) -> f64;
-    /// `out = a b + beta out` with dimensions `[m, k, n]`; each matrix with its row and column strides.
-    ///
-    /// # Safety
-    /// Every element that dimensions and strides reach must lie within the matrix's allocation.
-    #[allow(unsafe_code)]
-    unsafe fn gemm(
-        dims: [usize; 3],
-        a: (*const Self, [isize; 2]),
-        b: (*const Self, [isize; 2]),
-        beta: Self,
-        out: (*mut Self, [isize; 2]),
-    );
+    /// Writes the product of a panel of rows and of `b` to `out`'s rows `place.0..` of `place.1`.
+    fn multiply_panel(
+        out: &mut [Self],
+        place: (usize, usize),
+        panel: &[[Self; ROWS]],
+        b: Operand<'_, Self>,
+        update: Update,
+    ) {
+        kernel::multiply_panel(out, place, panel, b, update, |a, b, sum| a * b + sum);
+    }
     /// The value of a recorded number.
     fn of_f32(value: f32) -> Self {
         Self::of(f64::from(value))
@@ -60,18 +61,14 @@ impl Scalar for f32 {
     fn to_f64(self) -> f64 {
         f64::from(self)
     }
-    #[allow(unsafe_code)]
-    unsafe fn gemm(
-        [m, k, n]: [usize; 3],
-        (a, [a_row, a_column]): (*const Self, [isize; 2]),
-        (b, [b_row, b_column]): (*const Self, [isize; 2]),
-        beta: Self,
-        (out, [out_row, out_column]): (*mut Self, [isize; 2]),
+    fn multiply_panel(
+        out: &mut [Self],
+        place: (usize, usize),
+        panel: &[[Self; ROWS]],
+        b: Operand<'_, Self>,
+        update: Update,
     ) {
-        // SAFETY: the caller's promise is the one that `matrixmultiply` asks for.
-        unsafe {
-            matrixmultiply::sgemm(m, k, n, 1.0, a, a_row, a_column, b, b_row, b_column, beta, out, out_row, out_column);
-        }
+        kernel::multiply_panel_f32(out, place, panel, b, update);
     }
 }
 
@@ -90,19 +87,6 @@ impl Scalar for f64 {
     #[inline(always)]
     fn to_f64(self) -> f64 {
         self
-    }
-    #[allow(unsafe_code)]
-    unsafe fn gemm(
-        [m, k, n]: [usize; 3],
-        (a, [a_row, a_column]): (*const Self, [isize; 2]),
-        (b, [b_row, b_column]): (*const Self, [isize; 2]),
-        beta: Self,
-        (out, [out_row, out_column]): (*mut Self, [isize; 2]),
-    ) {
-        // SAFETY: the caller's promise is the one that `matrixmultiply` asks for.
-        unsafe {
-            matrixmultiply::dgemm(m, k, n, 1.0, a, a_row, a_column, b, b_row, b_column, beta, out, out_row, out_column);
-        }
     }
 }
 
