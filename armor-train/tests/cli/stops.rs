@@ -1,4 +1,4 @@
-//! A run that is interrupted or killed at any moment, and goes on.
+//! A run that is interrupted, killed at any moment or out of disk, and goes on.
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
@@ -100,9 +100,9 @@ fn an_interrupted_run_saves_says_how_to_go_on_and_ends_as_if_never_stopped() {
 fn a_run_that_is_killed_at_any_moment_ends_as_if_never_stopped() {
     let bench = Bench::new();
     let mut done = 0;
-    for round in 0..3 {
+    for (round, pause) in [0, 37, 74, 5, 111, 19, 53].into_iter().enumerate() {
         let running = Running::start(&bench, round > 0);
-        thread::sleep(Duration::from_millis(37 * round));
+        thread::sleep(Duration::from_millis(pause));
         running.kill();
         let steps = steps_done(&bench);
         assert!(steps > done && steps.is_multiple_of(1000), "{steps} after {done}");
@@ -147,4 +147,25 @@ fn a_reader_of_a_runs_files_never_sees_a_part_of_one() {
         assert!(still == before, "{} was written in place", path.display());
         assert!(fs::read(path).unwrap() != before, "{} was not written", path.display());
     }
+}
+
+/// A limit on the size of files stands for a disk that fills up: the write fails half way.
+#[test]
+fn a_run_on_a_full_disk_says_so_and_its_last_checkpoint_goes_on() {
+    let bench = Bench::new();
+    bench.success(&arguments(700, false));
+    let before = bench.bytes("run/checkpoint.postcard");
+
+    // In blocks of 512 bytes, fewer than the checkpoint has; all other files of the run are smaller.
+    let blocks = (before.len() - 1) / 512;
+    let limited = "trap '' XFSZ; ulimit -f \"$0\"; exec \"$@\"";
+    let run = bench.command(&arguments(900, true));
+    let mut command = Command::new("sh");
+    command.current_dir(bench.folder.path()).args(["-c", limited, &blocks.to_string()]);
+    let message = error(&command.arg(run.get_program()).args(run.get_args()).output().unwrap());
+
+    assert!(message.starts_with("error: cannot write run/checkpoint.postcard: File too large"), "{message}");
+    assert!(bench.bytes("run/checkpoint.postcard") == before);
+    assert!(!bench.names("run").iter().any(|name| name.ends_with(".part")));
+    ends_as_if_never_stopped(&bench, 900);
 }
