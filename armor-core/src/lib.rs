@@ -14,6 +14,7 @@
 //! | Eq. 12, reverse process | [`schedule::ChainStep`] |
 //! | Appendix B, activations | [`mish`] |
 //! | Appendix B, denoiser | [`shape::Shape`] |
+//! | the integer policies' arithmetic | [`fixed`] |
 //!
 //! Words: the *state* is what the robot senses, the *action* what it does;
 //! *kappa* is the cost that may still be incurred in this episode; a *chain*
@@ -27,6 +28,7 @@
 extern crate std;
 
 pub mod budget;
+pub mod fixed;
 pub mod image;
 pub mod mish;
 pub mod noise;

@@ -26,9 +26,9 @@ use armor_core::units::{Cost, CostLimit};
 use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
 
-use crate::denoiser::Denoiser;
+use crate::denoiser::{Denoiser, NotFinite};
 use crate::policy::{LoadError, Policy};
-use crate::sampler::{NotFinite, Sampler};
+use crate::sampler::Sampler;
 
 /// A policy in flight: its numbers in flash, its budget, and all the memory it works in.
 ///
@@ -74,7 +74,7 @@ pub enum Fault {
     /// Every chain of the policy takes more steps than the call allowed; the
     /// action is the fallback.
     NoRung,
-    /// The network answered with a NaN or an infinity; the action is the fallback.
+    /// The network met or answered a NaN or an infinity; the action is the fallback.
     ActionNotFinite,
 }
 
@@ -112,11 +112,11 @@ impl<'a, const STATE: usize, const ACTION: usize, const HIDDEN: usize> Controlle
         policy.check_capacities(STATE, ACTION, HIDDEN)?;
         policy.check_limit(limit)?;
         Ok(Self {
-            policy,
             budget: Budget::new(limit),
             noise: Noise::new(seed),
             tick: 0,
-            denoiser: Denoiser::new(),
+            denoiser: Denoiser::new(&policy),
+            policy,
             sampler: Sampler::new(),
         })
     }
@@ -174,7 +174,7 @@ impl<'a, const STATE: usize, const ACTION: usize, const HIDDEN: usize> Controlle
             return Err(Fault::StateNotFinite);
         }
         let rung = self.policy.rung_within(steps).ok_or(Fault::NoRung)?;
-        self.denoiser.prepare(&self.policy, state, self.budget.remaining());
+        self.denoiser.prepare(&self.policy, state, self.budget.remaining())?;
         self.sampler.run((&self.policy, rung), &mut self.denoiser, (&self.noise, self.tick), action)?;
         Ok(rung)
     }

@@ -67,7 +67,7 @@ impl Fixture {
         let normaliser = |_| [vec![0.25f32.to_bits(); s], vec![0.5f32.to_bits(); s]].concat();
         let contents = SectionKind::ALL.map(|kind| match kind {
             SectionKind::StateNormaliser => normaliser(kind),
-            SectionKind::ActionBounds | SectionKind::Chain => Vec::new(),
+            SectionKind::ActionBounds | SectionKind::Chain | SectionKind::Scales => Vec::new(),
             SectionKind::Kappa1 => layer(kind, 1, 2 * k),
             SectionKind::Kappa2 => layer(kind, k, k * k + k),
             SectionKind::Kappa3 => layer(kind, k, k * e + e),

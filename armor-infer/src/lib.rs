@@ -66,4 +66,5 @@ mod policy;
 mod sampler;
 
 pub use controller::{Controller, Fault, Step};
+pub use kernel::Kernel;
 pub use policy::{LoadError, Policy};

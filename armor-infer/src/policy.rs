@@ -7,6 +7,8 @@ use armor_core::schedule::ChainStep;
 use armor_core::shape::Shape;
 use armor_core::units::{Cost, CostLimit};
 
+use crate::kernel::Kernel;
+
 /// A view of a policy's numbers in the bytes of its image.
 ///
 /// Cheap to copy: it borrows the image's bytes and none of its manifest.
@@ -14,7 +16,9 @@ use armor_core::units::{Cost, CostLimit};
 pub struct Policy<'a> {
     pub(crate) shape: Shape,
     pub(crate) kappa: KappaRange,
+    pub(crate) precision: Precision,
     pub(crate) sections: Sections<'a>,
+    pub(crate) kernel: Kernel,
     /// The steps of each rung; empty where the image has no such rung.
     chains: [&'a [[u32; ChainStep::WORDS]]; MAX_RUNGS],
 }
@@ -90,12 +94,11 @@ impl<'a> Policy<'a> {
     /// that the policy is given to.
     pub fn load(image: &PolicyImage<'a>) -> Result<Self, LoadError> {
         let manifest = image.manifest();
-        if manifest.precision != Precision::F32 {
-            return Err(LoadError::Precision(manifest.precision));
-        }
         Ok(Self {
             shape: manifest.shape,
             kappa: manifest.kappa,
+            precision: manifest.precision,
+            kernel: Kernel::best(),
             sections: *image.sections(),
             chains: core::array::from_fn(|rung| image.sections().chain_words(manifest, rung)),
         })

@@ -10,12 +10,8 @@
 use armor_core::noise::Noise;
 use armor_core::schedule::ChainStep;
 
-use crate::denoiser::{Denoiser, front};
+use crate::denoiser::{Denoiser, NotFinite, front};
 use crate::policy::Policy;
-
-/// A chain met a number that is NaN or infinite.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct NotFinite;
 
 /// The working memory of a run, beside the denoiser's.
 pub(crate) struct Sampler<const ACTION: usize> {
@@ -102,7 +98,7 @@ mod tests {
         let image = fixture.image();
         let policy = Policy::load(&image).unwrap();
         let mut action = std::vec![0.0; SMALL.action.into()];
-        let (mut denoiser, noise) = (Denoiser::<8, 16>::new(), Noise::new(SEED));
+        let (mut denoiser, noise) = (Denoiser::<8, 16>::new(&policy), Noise::new(SEED));
         Sampler::<4>::new().run((&policy, 0), &mut denoiser, (&noise, TICK), &mut action).unwrap();
         action
     }

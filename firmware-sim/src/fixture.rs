@@ -56,6 +56,7 @@ impl Parts {
             SectionKind::ActionInput => layer(kind, a, a * h),
             SectionKind::Hidden2 | SectionKind::Hidden3 => layer(kind, h, h * h + h),
             SectionKind::Output => layer(kind, h, h * a + a),
+            SectionKind::Scales => Vec::new(),
             SectionKind::Chain => chain.clone(),
             SectionKind::Golden => vec![0; 4],
         });

@@ -36,6 +36,8 @@ pub enum ImageError {
     Section(SectionKind),
     /// A section holds a NaN or an infinity.
     NotFinite(SectionKind),
+    /// A section of an integer network holds a number with which a sum might overflow.
+    OutOfRange(SectionKind),
     /// An action bound is reversed, or the fallback action lies outside the bounds.
     Bounds,
 }
@@ -62,6 +64,9 @@ impl fmt::Display for ImageError {
             Self::Section(kind) => write!(f, "image section {kind:?} is missing, misplaced or of the wrong length"),
             Self::NotFinite(kind) => {
                 write!(f, "image section {kind:?} holds a NaN or an infinity; the training diverged")
+            }
+            Self::OutOfRange(kind) => {
+                write!(f, "image section {kind:?} holds a number out of its range; export it again")
             }
             Self::Bounds => f.write_str("image has reversed action bounds or a fallback action outside them"),
         }

@@ -81,9 +81,10 @@ impl Parts {
             .collect();
         contents[SectionKind::ActionBounds as usize] =
             [vec![(-1.0f32).to_bits(); a], vec![1.0f32.to_bits(); a], vec![0; a]].concat();
+        contents.push(Vec::new());
         let steps = rungs.iter().flat_map(|rung| schedule.chain(rung.sampler, rung.steps.into()));
         contents.push(steps.flat_map(|step| step.to_f32().to_words()).collect());
-        let row = (0..GoldenTrace::row_words(s, a) as u32).map(|i| word(13, i));
+        let row = (0..GoldenTrace::row_words(s, a) as u32).map(|i| word(14, i));
         contents.push([7, 8, 5 << 16, 1].into_iter().chain(row).collect());
         Self { manifest, contents }
     }

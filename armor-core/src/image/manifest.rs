@@ -4,6 +4,7 @@ use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
 use super::ImageError;
+use crate::fixed::{LONG_BITS, SHORT_BITS};
 use crate::schedule::{MAX_STEPS, Sampler, Schedule};
 use crate::shape::Shape;
 use crate::units::Cost;
@@ -44,6 +45,21 @@ pub struct Manifest<'a> {
 pub enum Precision {
     /// IEEE-754 single precision.
     F32,
+    /// 8-bit weights, 15-bit activations ([`crate::fixed`]).
+    Int16x8,
+    /// 8-bit weights, 7-bit activations between the hidden layers.
+    Int8,
+}
+
+impl Precision {
+    /// Bits of the codes between the hidden layers; none in single precision.
+    pub const fn code_bits(self) -> Option<u32> {
+        match self {
+            Self::F32 => None,
+            Self::Int16x8 => Some(LONG_BITS),
+            Self::Int8 => Some(SHORT_BITS),
+        }
+    }
 }
 
 /// How the remaining budget enters the network.
@@ -107,8 +123,9 @@ pub struct Section {
     pub length: u32,
 }
 
-/// What a section holds. All numbers are 32-bit little-endian words; a matrix
-/// from `I` inputs to `O` outputs is stored input by input, `O` words each.
+/// What a section holds, in single precision; `docs/image-format.md` has the
+/// integer layouts too. A section is 32-bit little-endian words; a matrix from
+/// `I` inputs to `O` outputs is stored input by input, `O` words each.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum SectionKind {
     /// Mean `[S]` and factor `[S]`: the network sees `(s - mean) * factor`.
@@ -133,6 +150,8 @@ pub enum SectionKind {
     Hidden3,
     /// Output layer: matrix `H x A`, bias `[A]`.
     Output,
+    /// The scales of an integer network; empty in single precision.
+    Scales,
     /// The steps of all rungs, one rung after the other (`ChainStep::to_words`).
     Chain,
     /// The golden trace: what the controller must reproduce bit for bit.
@@ -141,7 +160,7 @@ pub enum SectionKind {
 
 impl SectionKind {
     /// All sections, in the order in which they lie in an image.
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 14] = [
         Self::StateNormaliser,
         Self::ActionBounds,
         Self::Kappa1,
@@ -153,6 +172,7 @@ impl SectionKind {
         Self::Hidden2,
         Self::Hidden3,
         Self::Output,
+        Self::Scales,
         Self::Chain,
         Self::Golden,
     ];

@@ -11,6 +11,8 @@ mod fixture;
 mod golden;
 mod header;
 mod manifest;
+mod network;
+mod reader;
 mod sections;
 mod writer;
 
@@ -20,6 +22,7 @@ pub use header::{ALIGNMENT, HEADER_BYTES, MAGIC, VERSION};
 pub use manifest::{
     KappaRange, MAX_RUNGS, Manifest, Precision, Provenance, Quality, Rung, SECTION_COUNT, Section, SectionKind,
 };
+pub use network::{FloatNetwork, IntegerNetwork, LevelScales, Network, Rows};
 pub use sections::{Dense, Sections};
 pub use writer::{WriteError, write};
 

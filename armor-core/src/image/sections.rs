@@ -1,8 +1,10 @@
 //! The numbers of an image, as slices into its bytes.
 
+use super::ImageError;
 use super::golden::GoldenTrace;
-use super::manifest::{Manifest, SectionKind};
-use super::{ALIGNMENT, ImageError};
+use super::manifest::{Manifest, Precision, SectionKind};
+use super::network::{FloatNetwork, IntegerNetwork, Network};
+use super::reader::Reader;
 use crate::schedule::ChainStep;
 
 #[cfg(target_endian = "big")]
@@ -32,20 +34,8 @@ pub struct Sections<'a> {
     pub action_fallback: &'a [f32],
     /// The kappa embedding, `1 -> K -> K -> E`.
     pub kappa: [Dense<'a>; 3],
-    /// State part of layer 1, `S x H`, and its bias.
-    pub context_state: Dense<'a>,
-    /// Kappa part of layer 1, `E x H`.
-    pub context_kappa: &'a [f32],
-    /// Time part of layer 1, `N x H`; row `n - 1` for noise level `n`.
-    pub time_table: &'a [f32],
-    /// Action part of layer 1, `A x H`.
-    pub action_input: &'a [f32],
-    /// Layer 2, `H x H`.
-    pub hidden_2: Dense<'a>,
-    /// Layer 3, `H x H`.
-    pub hidden_3: Dense<'a>,
-    /// Output layer, `H x A`.
-    pub output: Dense<'a>,
+    /// The denoiser.
+    pub network: Network<'a>,
     /// The golden trace.
     pub golden: GoldenTrace<'a>,
     chain: &'a [[u32; ChainStep::WORDS]],
@@ -67,12 +57,11 @@ impl<'a> Sections<'a> {
     }
 
     pub(super) fn read(manifest: &Manifest<'_>, body: &'a [u8]) -> Result<Self, ImageError> {
-        let [s, a, h, k, e, n] = {
+        let [s, a, k, e] = {
             let shape = &manifest.shape;
-            [shape.state, shape.action, shape.hidden, shape.kappa_hidden, shape.kappa_embedding, shape.steps]
-                .map(usize::from)
+            [shape.state, shape.action, shape.kappa_hidden, shape.kappa_embedding].map(usize::from)
         };
-        let mut reader = Reader { manifest, body, next: 0, end: 0 };
+        let mut reader = Reader::new(manifest, body);
 
         let (state_mean, state_factor) = reader.pair(SectionKind::StateNormaliser, s, s)?;
         let (action_low, rest) = reader.pair(SectionKind::ActionBounds, a, 2 * a)?;
@@ -82,36 +71,18 @@ impl<'a> Sections<'a> {
             reader.dense(SectionKind::Kappa2, k, k)?,
             reader.dense(SectionKind::Kappa3, k, e)?,
         ];
-        let (matrices, context_bias) = reader.pair(SectionKind::Context, (s + e) * h, h)?;
-        let (state_weights, context_kappa) = matrices.split_at_checked(s * h).unwrap_or_default();
-        let time_table = reader.floats(SectionKind::TimeTable, n * h)?;
-        let action_input = reader.floats(SectionKind::ActionInput, a * h)?;
-        let hidden_2 = reader.dense(SectionKind::Hidden2, h, h)?;
-        let hidden_3 = reader.dense(SectionKind::Hidden3, h, h)?;
-        let output = reader.dense(SectionKind::Output, h, a)?;
+        let network = match manifest.precision {
+            Precision::F32 => Network::Float(FloatNetwork::read(manifest, &mut reader)?),
+            Precision::Int16x8 | Precision::Int8 => Network::Integer(IntegerNetwork::read(manifest, &mut reader)?),
+        };
         let chain_steps = manifest.rungs.iter().map(|rung| usize::from(rung.steps)).sum::<usize>();
         let chain = reader.words(SectionKind::Chain, Some(chain_steps * ChainStep::WORDS))?;
         let golden = GoldenTrace::read(reader.words(SectionKind::Golden, None)?, s, a)?;
         reader.finish()?;
 
         let (chain, _) = chain.as_chunks();
-        let sections = Self {
-            state_mean,
-            state_factor,
-            action_low,
-            action_high,
-            action_fallback,
-            kappa,
-            context_state: Dense { weights: state_weights, bias: context_bias },
-            context_kappa,
-            time_table,
-            action_input,
-            hidden_2,
-            hidden_3,
-            output,
-            golden,
-            chain,
-        };
+        let sections =
+            Self { state_mean, state_factor, action_low, action_high, action_fallback, kappa, network, golden, chain };
         sections.check_bounds()?;
         sections.check_chains(manifest)?;
         Ok(sections)
@@ -145,65 +116,5 @@ impl<'a> Sections<'a> {
             }
         }
         Ok(())
-    }
-}
-
-/// Takes the sections from the body, one after the other.
-struct Reader<'m, 'a> {
-    manifest: &'m Manifest<'m>,
-    body: &'a [u8],
-    /// Index of the next section in the table.
-    next: usize,
-    /// Where the last section ended.
-    end: usize,
-}
-
-impl<'a> Reader<'_, 'a> {
-    /// The words of the next section, which must be `kind` and, where given, hold `count` words.
-    fn words(&mut self, kind: SectionKind, count: Option<usize>) -> Result<&'a [u32], ImageError> {
-        let error = ImageError::Section(kind);
-        let section = self.manifest.sections.get(self.next).ok_or(error)?;
-        let (offset, length) = (section.offset as usize, section.length as usize);
-        if section.kind != kind || offset != self.end.next_multiple_of(ALIGNMENT) {
-            return Err(error);
-        }
-        if count.is_some_and(|count| length != 4 * count) {
-            return Err(error);
-        }
-        let padding = self.body.get(self.end..offset).ok_or(error)?;
-        let bytes = self.body.get(offset..).and_then(|rest| rest.get(..length)).ok_or(error)?;
-        if padding.iter().any(|&byte| byte != 0) {
-            return Err(error);
-        }
-        self.next += 1;
-        self.end = offset + length;
-        bytemuck::try_cast_slice(bytes).map_err(|_| error)
-    }
-
-    fn floats(&mut self, kind: SectionKind, count: usize) -> Result<&'a [f32], ImageError> {
-        let words = self.words(kind, Some(count))?;
-        let floats: &[f32] = bytemuck::try_cast_slice(words).map_err(|_| ImageError::Section(kind))?;
-        if floats.iter().any(|value| !value.is_finite()) {
-            return Err(ImageError::NotFinite(kind));
-        }
-        Ok(floats)
-    }
-
-    fn pair(&mut self, kind: SectionKind, first: usize, second: usize) -> Result<(&'a [f32], &'a [f32]), ImageError> {
-        self.floats(kind, first + second)?.split_at_checked(first).ok_or(ImageError::Section(kind))
-    }
-
-    fn dense(&mut self, kind: SectionKind, inputs: usize, outputs: usize) -> Result<Dense<'a>, ImageError> {
-        let (weights, bias) = self.pair(kind, inputs * outputs, outputs)?;
-        Ok(Dense { weights, bias })
-    }
-
-    /// The last section ends where the image ends, and no section follows it.
-    fn finish(&self) -> Result<(), ImageError> {
-        if self.end == self.body.len() && self.next == self.manifest.sections.len() {
-            Ok(())
-        } else {
-            Err(ImageError::Section(SectionKind::Golden))
-        }
     }
 }

@@ -15,24 +15,25 @@ fn what_was_written_is_read_back_in_place() {
     let numbers = image.sections();
     let dense = |layer: &Dense<'_>| [layer.weights, layer.bias].concat();
     let [kappa_1, kappa_2, kappa_3] = &numbers.kappa;
-    let context = &numbers.context_state;
+    let Network::Float(network) = &numbers.network else { panic!("the fixture is in single precision") };
+    let context = &network.context_state;
     let read = [
         [numbers.state_mean, numbers.state_factor].concat(),
         [numbers.action_low, numbers.action_high, numbers.action_fallback].concat(),
         dense(kappa_1),
         dense(kappa_2),
         dense(kappa_3),
-        [context.weights, numbers.context_kappa, context.bias].concat(),
-        numbers.time_table.to_vec(),
-        numbers.action_input.to_vec(),
-        dense(&numbers.hidden_2),
-        dense(&numbers.hidden_3),
-        dense(&numbers.output),
+        [context.weights, network.context_kappa, context.bias].concat(),
+        network.time_table.to_vec(),
+        network.action_input.to_vec(),
+        dense(&network.hidden_2),
+        dense(&network.hidden_3),
+        dense(&network.output),
     ];
     for (read, written) in read.iter().zip(&parts.contents) {
         assert_eq!(&words(read), written);
     }
-    assert_eq!((kappa_3.bias.len(), context.weights.len(), numbers.context_kappa.len()), (6, 3 * 5, 6 * 5));
+    assert_eq!((kappa_3.bias.len(), context.weights.len(), network.context_kappa.len()), (6, 3 * 5, 6 * 5));
 
     let chain = |index| numbers.chain(image.manifest(), index).collect::<Vec<_>>();
     let expected = |sampler, steps| Schedule::vp(7).chain(sampler, steps).map(ChainStep::<f64>::to_f32);
@@ -42,9 +43,9 @@ fn what_was_written_is_read_back_in_place() {
 
     assert_eq!((numbers.golden.seed, numbers.golden.limit.to_f32()), (8 << 32 | 7, 5.0));
     let [row] = numbers.golden.rows().collect::<Vec<_>>()[..] else { panic!("one row was written") };
-    assert_eq!(words(row.state), [0, 1, 2].map(|i| word(13, i)));
-    assert_eq!((row.incurred.to_bits(), row.kappa.to_raw()), (word(13, 3), word(13, 4)));
-    assert_eq!(words(row.action), [5, 6].map(|i| word(13, i)));
+    assert_eq!(words(row.state), [0, 1, 2].map(|i| word(14, i)));
+    assert_eq!((row.incurred.to_bits(), row.kappa.to_raw()), (word(14, 3), word(14, 4)));
+    assert_eq!(words(row.action), [5, 6].map(|i| word(14, i)));
 }
 
 #[test]
@@ -112,8 +113,9 @@ fn a_section_of_the_wrong_length_is_named() {
         longer.section(kind).push(0);
         assert_eq!(longer.fault(), ImageError::Section(kind));
         let mut shorter = Parts::new(SHAPE);
-        shorter.section(kind).pop();
-        assert_eq!(shorter.fault(), ImageError::Section(kind));
+        if shorter.section(kind).pop().is_some() {
+            assert_eq!(shorter.fault(), ImageError::Section(kind));
+        }
     }
 }
 
@@ -135,9 +137,9 @@ fn the_section_table_leaves_no_choice() {
     let last = Err(ImageError::Section(SectionKind::Golden));
     assert_eq!(resealed(|manifest| manifest.sections.swap(0, 1)), first);
     assert_eq!(resealed(|manifest| manifest.sections[0].offset = 16), first);
-    assert_eq!(resealed(|manifest| manifest.sections[12].offset += 16), last);
-    assert_eq!(resealed(|manifest| manifest.sections[12].length = u32::MAX), last);
-    assert_eq!(resealed(|manifest| manifest.sections.truncate(12)), last);
+    assert_eq!(resealed(|manifest| manifest.sections[13].offset += 16), last);
+    assert_eq!(resealed(|manifest| manifest.sections[13].length = u32::MAX), last);
+    assert_eq!(resealed(|manifest| manifest.sections.truncate(13)), last);
     assert_eq!(resealed(|manifest| manifest.sections.clear()), first);
 }
 

@@ -1,15 +1,76 @@
-//! Matrix-vector products, and the one numerical contract that they all keep.
+//! The loops in which the time goes, and the one numerical contract that they
+//! all keep (`docs/numerics.md`): whatever the machine, the bits are equal.
 //!
-//! For a matrix from `I` inputs to `O` outputs, stored input by input,
-//!
-//! ```text
-//! out[o] = ((start[o] + x[0] w[0][o]) + x[1] w[1][o]) + ... + x[I-1] w[I-1][o]
-//! ```
-//!
-//! in f32, each product and each sum rounded on its own (no fused
-//! multiply-add), the inputs in this order. How many outputs a machine works
-//! on at a time does not show in the bits, so a kernel is free in that alone.
+//! A kernel for another machine is another variant of [`Kernel`]: it takes
+//! over those of the five operations that it does better and leaves the others
+//! to the portable code, which says what their results must be.
 
-mod portable;
+mod float;
+mod integer;
 
-pub(crate) use portable::accumulate;
+/// The instructions that a policy's arithmetic runs on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kernel {
+    /// What the compiler makes of plain loops.
+    Portable,
+}
+
+impl Kernel {
+    /// The fastest kernel of this machine.
+    pub fn best() -> Self {
+        Self::Portable
+    }
+
+    /// For a matrix from `I` inputs to `O` outputs, stored input by input,
+    ///
+    /// ```text
+    /// out[o] = ((out[o] + x[0] w[0][o]) + x[1] w[1][o]) + ... + x[I-1] w[I-1][o]
+    /// ```
+    ///
+    /// in f32, each product and each sum rounded on its own (no fused
+    /// multiply-add), the inputs in this order. How many outputs a machine
+    /// works on at a time does not show in the bits, so a kernel is free in
+    /// that alone. Where `weights` is too short, the inputs without weights are
+    /// left out.
+    pub(crate) fn accumulate(self, weights: &[f32], x: &[f32], out: &mut [f32]) {
+        match self {
+            Self::Portable => float::accumulate(weights, x, out),
+        }
+    }
+
+    /// [`armor_core::mish::mish`] of each value, in place.
+    pub(crate) fn mish(self, values: &mut [f32]) {
+        match self {
+            Self::Portable => float::mish(values),
+        }
+    }
+
+    /// `sums[o]`: the sum of a row's `weights` times `codes`, for `O` rows of
+    /// `I` weights. At most [`fixed::MAX_TERMS`] codes, so that no sum
+    /// overflows and their order does not matter; codes of 7 bits lie within 0
+    /// and 127, those of 15 bits within -32767 and 32767. Rows without weights
+    /// keep their sum.
+    ///
+    /// [`fixed::MAX_TERMS`]: armor_core::fixed::MAX_TERMS
+    pub(crate) fn sum_rows(self, weights: &[i8], codes: &[i16], bits: u32, sums: &mut [i32]) {
+        let _ = bits;
+        match self {
+            Self::Portable => integer::sum_rows(weights, codes, sums),
+        }
+    }
+
+    /// Sums over codes of `bits` become pre-activations
+    /// ([`armor_core::fixed::rescale`]), in place.
+    pub(crate) fn rescale(self, sums: &mut [i32], bits: u32, multiplier: &[i32], rescale: i32, bias: &[i32]) {
+        match self {
+            Self::Portable => integer::rescale(sums, bits, multiplier, rescale, bias),
+        }
+    }
+
+    /// Pre-activations become codes ([`armor_core::fixed::activate`]).
+    pub(crate) fn activate(self, pre: &[i32], factor: i32, bits: u32, codes: &mut [i16]) {
+        match self {
+            Self::Portable => integer::activate(pre, factor, bits, codes),
+        }
+    }
+}

@@ -1,21 +1,18 @@
-//! The denoiser `eps(a^n, n | s, kappa)` of Appendix B, with everything that
-//! is constant along a chain computed once ([`armor_core::shape`] has the
-//! formulas).
+//! The denoiser in single precision.
 //!
 //! Order of the sums, which fixes their bits: the context starts at the bias,
 //! then come the state entries, then the kappa embedding; the first layer
 //! starts at `T[n] + context`, then come the action entries; every other layer
 //! starts at its bias.
 
-use armor_core::image::Dense;
-use armor_core::mish::mish;
+use armor_core::image::FloatNetwork;
 use armor_core::units::Cost;
 
-use crate::kernel;
+use super::{affine, front, kappa_embedding, normalised};
 use crate::policy::Policy;
 
 /// The working memory of a denoiser.
-pub(crate) struct Denoiser<const STATE: usize, const HIDDEN: usize> {
+pub(crate) struct FloatDenoiser<const STATE: usize, const HIDDEN: usize> {
     /// The normalised state `[S]`.
     state: [f32; STATE],
     /// `W_s s + W_k e(kappa) + b` of layer 1 `[H]`.
@@ -26,89 +23,54 @@ pub(crate) struct Denoiser<const STATE: usize, const HIDDEN: usize> {
     even: [f32; HIDDEN],
 }
 
-impl<const STATE: usize, const HIDDEN: usize> Denoiser<STATE, HIDDEN> {
-    /// Memory for policies up to these capacities.
-    pub(crate) const fn new() -> Self {
+impl<const STATE: usize, const HIDDEN: usize> FloatDenoiser<STATE, HIDDEN> {
+    pub(super) const fn new() -> Self {
         Self { state: [0.0; STATE], context: [0.0; HIDDEN], odd: [0.0; HIDDEN], even: [0.0; HIDDEN] }
     }
 
-    /// Computes what a chain of `policy` needs of the state `[S]` and the
-    /// remaining budget.
-    pub(crate) fn prepare(&mut self, policy: &Policy<'_>, state: &[f32], kappa: Cost) {
-        let [s, h, k, e] = {
-            let shape = &policy.shape;
-            [shape.state, shape.hidden, shape.kappa_hidden, shape.kappa_embedding].map(usize::from)
-        };
-        let numbers = &policy.sections;
-
-        let normalised = front(&mut self.state, s);
-        let normaliser = numbers.state_mean.iter().zip(numbers.state_factor);
-        for ((out, value), (mean, factor)) in normalised.iter_mut().zip(state).zip(normaliser) {
-            *out = (value - mean) * factor;
+    pub(super) fn prepare(&mut self, policy: &Policy<'_>, network: &FloatNetwork<'_>, state: &[f32], kappa: Cost) {
+        let entries = front(&mut self.state, policy.shape.state.into());
+        for (out, value) in entries.iter_mut().zip(normalised(policy, state)) {
+            *out = value;
         }
-
-        let [layer_1, layer_2, layer_3] = &numbers.kappa;
-        let first = front(&mut self.odd, k);
-        let second = front(&mut self.even, k);
-        affine(layer_1, &[policy.kappa.scale * kappa.to_f32()], first);
-        activate(first);
-        affine(layer_2, first, second);
-        activate(second);
-        let embedding = front(&mut self.odd, e);
-        affine(layer_3, second, embedding);
-
-        let context = front(&mut self.context, h);
-        affine(&numbers.context_state, normalised, context);
-        kernel::accumulate(numbers.context_kappa, embedding, context);
+        let embedding = kappa_embedding(policy, kappa, &mut self.odd, &mut self.even);
+        let context = front(&mut self.context, policy.shape.hidden.into());
+        affine(policy.kernel, &network.context_state, entries, context);
+        policy.kernel.accumulate(network.context_kappa, embedding, context);
     }
 
-    /// The noise that the network sees in `action` `[A]` at noise level `n`,
-    /// into `eps` `[A]`, given what [`Denoiser::prepare`] left.
-    pub(crate) fn eps(&mut self, policy: &Policy<'_>, n: usize, action: &[f32], eps: &mut [f32]) {
-        let h = usize::from(policy.shape.hidden);
-        let numbers = &policy.sections;
+    pub(super) fn eps(
+        &mut self,
+        policy: &Policy<'_>,
+        network: &FloatNetwork<'_>,
+        n: usize,
+        action: &[f32],
+        eps: &mut [f32],
+    ) {
+        let (kernel, h) = (policy.kernel, usize::from(policy.shape.hidden));
         let odd = front(&mut self.odd, h);
         let even = front(&mut self.even, h);
 
-        let time = numbers.time_table.get(n.saturating_sub(1) * h..).unwrap_or_default();
+        let time = network.time_table.get(n.saturating_sub(1) * h..).unwrap_or_default();
         for ((out, time), context) in odd.iter_mut().zip(time).zip(&self.context) {
             *out = time + context;
         }
-        kernel::accumulate(numbers.action_input, action, odd);
-        activate(odd);
-        affine(&numbers.hidden_2, odd, even);
-        activate(even);
-        affine(&numbers.hidden_3, even, odd);
-        activate(odd);
-        affine(&numbers.output, odd, eps);
-    }
-}
-
-/// The first `length` entries of a buffer, or none if it is shorter; the
-/// controller has checked that no buffer is.
-pub(crate) fn front(buffer: &mut [f32], length: usize) -> &mut [f32] {
-    buffer.get_mut(..length).unwrap_or_default()
-}
-
-/// `out = bias + W x`.
-fn affine(layer: &Dense<'_>, x: &[f32], out: &mut [f32]) {
-    for (out, bias) in out.iter_mut().zip(layer.bias) {
-        *out = *bias;
-    }
-    kernel::accumulate(layer.weights, x, out);
-}
-
-fn activate(values: &mut [f32]) {
-    for value in values {
-        *value = mish(*value);
+        kernel.accumulate(network.action_input, action, odd);
+        kernel.mish(odd);
+        affine(kernel, &network.hidden_2, odd, even);
+        kernel.mish(even);
+        affine(kernel, &network.hidden_3, even, odd);
+        kernel.mish(odd);
+        affine(kernel, &network.output, odd, eps);
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::denoiser::Denoiser;
     use crate::fixture::{self, Fixture, PAPER};
-    use armor_core::image::Sections;
+    use armor_core::image::{Network, Sections};
     use armor_core::noise::Noise;
     use armor_core::shape::Shape;
     use std::vec;
@@ -138,6 +100,7 @@ mod tests {
         action: &[f32],
         n: usize,
     ) -> Vec<f64> {
+        let Network::Float(network) = &numbers.network else { panic!("the fixture is in single precision") };
         let [one, two, three] = &numbers.kappa;
         let hidden = activated(affine(one.weights, one.bias, &[scaled]));
         let hidden = activated(affine(two.weights, two.bias, &hidden));
@@ -149,11 +112,11 @@ mod tests {
             (0..state.len()).map(|i| f64::from(state[i] - numbers.state_mean[i]) * f64::from(numbers.state_factor[i]));
         let input: Vec<f64> =
             action.iter().map(|a| f64::from(*a)).chain(normalised).chain(embedding).chain(time).collect();
-        let parts = [numbers.action_input, numbers.context_state.weights, numbers.context_kappa, numbers.time_table];
-        let layer_1 = activated(affine(&parts.concat(), numbers.context_state.bias, &input));
-        let layer_2 = activated(affine(numbers.hidden_2.weights, numbers.hidden_2.bias, &layer_1));
-        let layer_3 = activated(affine(numbers.hidden_3.weights, numbers.hidden_3.bias, &layer_2));
-        affine(numbers.output.weights, numbers.output.bias, &layer_3)
+        let parts = [network.action_input, network.context_state.weights, network.context_kappa, network.time_table];
+        let layer_1 = activated(affine(&parts.concat(), network.context_state.bias, &input));
+        let layer_2 = activated(affine(network.hidden_2.weights, network.hidden_2.bias, &layer_1));
+        let layer_3 = activated(affine(network.hidden_3.weights, network.hidden_3.bias, &layer_2));
+        affine(network.output.weights, network.output.bias, &layer_3)
     }
 
     #[test]
@@ -164,13 +127,13 @@ mod tests {
             let image = fixture.image();
             let policy = Policy::load(&image).unwrap();
             let (mut state, mut action) = (vec![0.0; shape.state.into()], vec![0.0; shape.action.into()]);
-            let mut denoiser = Denoiser::<16, 256>::new();
+            let mut denoiser = Denoiser::<16, 256>::new(&policy);
             for n in 1..=usize::from(shape.steps) {
                 Noise::new(2).fill_normal(0, n as u64, &mut state);
                 Noise::new(2).fill_normal(1, n as u64, &mut action);
                 let kappa = Cost::from_incurred(n as f32 * 0.75).unwrap();
                 let mut eps = vec![0.0; action.len()];
-                denoiser.prepare(&policy, &state, kappa);
+                denoiser.prepare(&policy, &state, kappa).unwrap();
                 denoiser.eps(&policy, n, &action, &mut eps);
 
                 let scaled = f64::from(policy.kappa.scale) * f64::from(kappa.to_f32());

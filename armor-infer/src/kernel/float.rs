@@ -1,4 +1,4 @@
-//! The kernel for every machine: plain loops that a compiler vectorises.
+//! Single precision for every machine: plain loops that a compiler vectorises.
 
 /// Outputs whose sums are kept in registers while the inputs pass by: eight
 /// SSE registers, as many as two additions a cycle of latency four keep busy.
@@ -10,11 +10,9 @@ const WIDE: usize = 16;
 /// Outputs at a time in what is left of them.
 const NARROW: usize = 8;
 
-/// `out[o] += sum over i of x[i] weights[i * O + o]`, by the contract of [`super`].
-///
-/// `weights` is `I x O`, `x` `[I]`, `out` `[O]` and holds the start values.
-/// Where `weights` is too short, the inputs without weights are left out.
-pub(crate) fn accumulate(weights: &[f32], x: &[f32], out: &mut [f32]) {
+/// [`Kernel::accumulate`](super::Kernel::accumulate).
+#[inline(always)]
+pub(super) fn accumulate(weights: &[f32], x: &[f32], out: &mut [f32]) {
     let stride = out.len().max(1);
     let (weights, out) = blocks::<WIDE>(weights, stride, x, out);
     let (weights, out) = blocks::<NARROW>(weights, stride, x, out);
@@ -32,8 +30,17 @@ pub(crate) fn accumulate(weights: &[f32], x: &[f32], out: &mut [f32]) {
     };
 }
 
+/// [`Kernel::mish`](super::Kernel::mish).
+#[inline(always)]
+pub(super) fn mish(values: &mut [f32]) {
+    for value in values {
+        *value = armor_core::mish::mish(*value);
+    }
+}
+
 /// Works on `out` in blocks of `B` outputs; returns the outputs left over, and
 /// the weights from their first column on.
+#[inline(always)]
 fn blocks<'w, 'o, const B: usize>(
     mut weights: &'w [f32],
     stride: usize,

@@ -1,0 +1,138 @@
+//! The denoiser in fixed point ([`armor_core::fixed`]): 8-bit weights, integer
+//! codes and sums between the `f32` of the sampler and the `f32` of its noise.
+//!
+//! The state, the kappa embedding and the noisy action come in as 15-bit codes
+//! and a sign, the first two scaled by their own largest entry. Between the
+//! hidden layers codes have the width of the policy's precision, and those of
+//! layer 3 always 15 bits, for the output layer is small.
+
+use armor_core::fixed::{LONG_BITS, long_code, rescale};
+use armor_core::image::{IntegerNetwork, LevelScales, Rows};
+use armor_core::units::Cost;
+
+use super::{NotFinite, front, kappa_embedding, normalised};
+use crate::kernel::Kernel;
+use crate::policy::Policy;
+
+/// The working memory of an integer denoiser.
+pub(crate) struct IntegerDenoiser<const STATE: usize, const HIDDEN: usize> {
+    /// The codes of the state `[S]`.
+    state: [i16; STATE],
+    /// The two layers of the kappa embedding that are in use `[K]`, `[E]`.
+    embedding: [[f32; HIDDEN]; 2],
+    /// What layer 1 has of bias, state and budget, pre-activations `[H]`.
+    context: [i32; HIDDEN],
+    /// Sums and pre-activations of a layer `[H]`.
+    sums: [i32; HIDDEN],
+    /// Codes of a layer's activations `[H]`.
+    codes: [i16; HIDDEN],
+}
+
+impl<const STATE: usize, const HIDDEN: usize> IntegerDenoiser<STATE, HIDDEN> {
+    pub(super) const fn new() -> Self {
+        Self {
+            state: [0; STATE],
+            embedding: [[0.0; HIDDEN]; 2],
+            context: [0; HIDDEN],
+            sums: [0; HIDDEN],
+            codes: [0; HIDDEN],
+        }
+    }
+
+    pub(super) fn prepare(
+        &mut self,
+        policy: &Policy<'_>,
+        network: &IntegerNetwork<'_>,
+        state: &[f32],
+        kappa: Cost,
+    ) -> Result<(), NotFinite> {
+        let context = front(&mut self.context, policy.shape.hidden.into());
+        for (out, bias) in context.iter_mut().zip(network.context_bias) {
+            *out = *bias;
+        }
+
+        let codes = front(&mut self.state, policy.shape.state.into());
+        let unit = encode(normalised(policy, state), network.state_unit, codes)?;
+        add_rows(policy.kernel, &network.context_state, codes, unit, &mut self.sums, context);
+
+        let [first, second] = &mut self.embedding;
+        let embedding = kappa_embedding(policy, kappa, first, second);
+        let codes = front(&mut self.codes, embedding.len());
+        let unit = encode(embedding.iter().copied(), network.kappa_unit, codes)?;
+        add_rows(policy.kernel, &network.context_kappa, codes, unit, &mut self.sums, context);
+        Ok(())
+    }
+
+    pub(super) fn eps(
+        &mut self,
+        policy: &Policy<'_>,
+        network: &IntegerNetwork<'_>,
+        n: usize,
+        action: &[f32],
+        eps: &mut [f32],
+    ) {
+        // An image's chains stay within its levels, and integers have a width.
+        let (Some(level), Some(bits)) = (network.level(n), policy.precision.code_bits()) else { return };
+        let LevelScales { activate, rescale, last_scale } = level;
+        let (kernel, h) = (policy.kernel, usize::from(policy.shape.hidden));
+        let sums = front(&mut self.sums, h);
+        let codes = front(&mut self.codes, h);
+
+        let time = network.time_table.get((n - 1) * h..).unwrap_or_default();
+        for ((out, time), context) in sums.iter_mut().zip(time).zip(&self.context) {
+            *out = (i32::from(*time) << network.time_shift) + context;
+        }
+        let weights = network.action_input.chunks_exact(h.max(1));
+        for (entry, weights) in action.iter().zip(weights) {
+            let code = i32::from(long_code(*entry, network.action_factor));
+            for (out, weight) in sums.iter_mut().zip(weights) {
+                *out += (code * i32::from(*weight)) >> network.action_shift;
+            }
+        }
+        kernel.activate(sums, activate[0], bits, codes);
+
+        kernel.sum_rows(network.hidden_2.weights, codes, bits, sums);
+        kernel.rescale(sums, bits, network.hidden_2.multiplier, rescale[0], network.bias_2);
+        kernel.activate(sums, activate[1], bits, codes);
+
+        kernel.sum_rows(network.hidden_3.weights, codes, bits, sums);
+        kernel.rescale(sums, bits, network.hidden_3.multiplier, rescale[1], network.bias_3);
+        kernel.activate(sums, activate[2], LONG_BITS, codes);
+
+        let weights = network.output.chunks_exact((2 * h).max(1));
+        let scales = network.output_factor.iter().zip(network.output_bias);
+        for ((eps, weights), (factor, bias)) in eps.iter_mut().zip(weights).zip(scales) {
+            let mut parts = [0; 2];
+            kernel.sum_rows(weights, codes, LONG_BITS, &mut parts);
+            let [high, low] = parts.map(|sum| sum as f32);
+            *eps = (high * 128.0 + low) * (factor * last_scale) + bias;
+        }
+    }
+}
+
+/// Puts values into codes, the largest magnitude at the highest code; returns
+/// the rescale of a sum over them, `unit` times that magnitude.
+fn encode(values: impl Iterator<Item = f32> + Clone, unit: f32, codes: &mut [i16]) -> Result<i32, NotFinite> {
+    let mut largest = 0.0f32;
+    for value in values.clone() {
+        if !value.is_finite() {
+            return Err(NotFinite);
+        }
+        largest = largest.max(value.abs());
+    }
+    let factor = f32::from(i16::MAX) / largest;
+    for (code, value) in codes.iter_mut().zip(values) {
+        *code = long_code(value, factor);
+    }
+    // A cast of what is too large takes the largest integer.
+    Ok((largest * unit) as i32)
+}
+
+/// Adds a part of layer 1 that is computed once an action.
+fn add_rows(kernel: Kernel, rows: &Rows<'_>, codes: &[i16], unit: i32, sums: &mut [i32], out: &mut [i32]) {
+    let sums = front(sums, out.len());
+    kernel.sum_rows(rows.weights, codes, LONG_BITS, sums);
+    for ((out, sum), multiplier) in out.iter_mut().zip(sums).zip(rows.multiplier) {
+        *out += rescale(*sum, LONG_BITS, *multiplier, unit);
+    }
+}

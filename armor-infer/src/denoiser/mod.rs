@@ -1,0 +1,99 @@
+//! The denoiser `eps(a^n, n | s, kappa)` of Appendix B, with everything that
+//! is constant along a chain computed once ([`armor_core::shape`] has the
+//! formulas). `docs/numerics.md` says in which order sums are taken and how
+//! integers are rounded.
+
+mod float;
+mod integer;
+
+use armor_core::image::{Dense, Network};
+use armor_core::units::Cost;
+
+use crate::kernel::Kernel;
+use crate::policy::Policy;
+use float::FloatDenoiser;
+use integer::IntegerDenoiser;
+
+/// A denoiser met a number that is NaN or infinite.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct NotFinite;
+
+/// The working memory of a denoiser, for the number format of its policy.
+pub(crate) enum Denoiser<const STATE: usize, const HIDDEN: usize> {
+    Float(FloatDenoiser<STATE, HIDDEN>),
+    Integer(IntegerDenoiser<STATE, HIDDEN>),
+}
+
+impl<const STATE: usize, const HIDDEN: usize> Denoiser<STATE, HIDDEN> {
+    /// Memory for a policy within these capacities.
+    pub(crate) const fn new(policy: &Policy<'_>) -> Self {
+        match policy.sections.network {
+            Network::Float(_) => Self::Float(FloatDenoiser::new()),
+            Network::Integer(_) => Self::Integer(IntegerDenoiser::new()),
+        }
+    }
+
+    /// Computes what a chain of `policy` needs of the state `[S]` and the
+    /// remaining budget.
+    ///
+    /// # Errors
+    /// [`NotFinite`] where an integer policy cannot put the state or the
+    /// embedding into codes. In single precision such numbers pass on, and the
+    /// chain's estimate shows them.
+    pub(crate) fn prepare(&mut self, policy: &Policy<'_>, state: &[f32], kappa: Cost) -> Result<(), NotFinite> {
+        match (self, &policy.sections.network) {
+            (Self::Float(memory), Network::Float(network)) => memory.prepare(policy, network, state, kappa),
+            (Self::Integer(memory), Network::Integer(network)) => memory.prepare(policy, network, state, kappa)?,
+            // A denoiser is made for the policy that it is given.
+            (Self::Float(_), Network::Integer(_)) | (Self::Integer(_), Network::Float(_)) => return Err(NotFinite),
+        }
+        Ok(())
+    }
+
+    /// The noise that the network sees in `action` `[A]` at noise level `n`,
+    /// into `eps` `[A]`, given what [`Denoiser::prepare`] left.
+    pub(crate) fn eps(&mut self, policy: &Policy<'_>, n: usize, action: &[f32], eps: &mut [f32]) {
+        match (self, &policy.sections.network) {
+            (Self::Float(memory), Network::Float(network)) => memory.eps(policy, network, n, action, eps),
+            (Self::Integer(memory), Network::Integer(network)) => memory.eps(policy, network, n, action, eps),
+            (Self::Float(_), Network::Integer(_)) | (Self::Integer(_), Network::Float(_)) => {}
+        }
+    }
+}
+
+/// The kappa embedding, in single precision for every policy: it is small, and
+/// computed once an action. `first` and `second` are its working memory.
+fn kappa_embedding<'m>(policy: &Policy<'_>, kappa: Cost, first: &'m mut [f32], second: &mut [f32]) -> &'m mut [f32] {
+    let [k, e] = [policy.shape.kappa_hidden, policy.shape.kappa_embedding].map(usize::from);
+    let [layer_1, layer_2, layer_3] = &policy.sections.kappa;
+    let kernel = policy.kernel;
+    let hidden = front(first, k);
+    affine(kernel, layer_1, &[policy.kappa.scale * kappa.to_f32()], hidden);
+    kernel.mish(hidden);
+    let second = front(second, k);
+    affine(kernel, layer_2, hidden, second);
+    kernel.mish(second);
+    let embedding = front(first, e);
+    affine(kernel, layer_3, second, embedding);
+    embedding
+}
+
+/// The normalised entries of a state `[S]`.
+fn normalised<'s>(policy: &Policy<'s>, state: &'s [f32]) -> impl Iterator<Item = f32> + Clone + use<'s> {
+    let normaliser = policy.sections.state_mean.iter().zip(policy.sections.state_factor);
+    state.iter().zip(normaliser).map(|(value, (mean, factor))| (value - mean) * factor)
+}
+
+/// The first `length` entries of a buffer, or none if it is shorter; the
+/// controller has checked that no buffer is.
+pub(crate) fn front<T>(buffer: &mut [T], length: usize) -> &mut [T] {
+    buffer.get_mut(..length).unwrap_or_default()
+}
+
+/// `out = bias + W x`.
+fn affine(kernel: Kernel, layer: &Dense<'_>, x: &[f32], out: &mut [f32]) {
+    for (out, bias) in out.iter_mut().zip(layer.bias) {
+        *out = *bias;
+    }
+    kernel.accumulate(layer.weights, x, out);
+}
