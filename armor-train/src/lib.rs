@@ -12,6 +12,7 @@
 //! | Eq. 16, dual variable | [`dual`] |
 //! | section 3, one training step | [`learner`], [`update`] |
 //! | Table 2, hyperparameters | [`config`] |
+//! | a trained policy in integers | [`quantize`] |
 
 pub mod actor;
 pub mod batch;
@@ -26,6 +27,7 @@ pub mod model;
 pub mod nn;
 pub mod normaliser;
 pub mod pcgrad;
+pub mod quantize;
 pub mod report;
 pub mod reweight;
 pub mod run;

@@ -126,7 +126,7 @@ pub struct Section {
 /// What a section holds, in single precision; `docs/image-format.md` has the
 /// integer layouts too. A section is 32-bit little-endian words; a matrix from
 /// `I` inputs to `O` outputs is stored input by input, `O` words each.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum SectionKind {
     /// Mean `[S]` and factor `[S]`: the network sees `(s - mean) * factor`.
     StateNormaliser,

@@ -32,6 +32,8 @@ use header::Header;
 #[derive(Clone, Debug)]
 pub struct PolicyImage<'a> {
     bytes: &'a [u8],
+    /// What follows the padded manifest.
+    body: &'a [u8],
     manifest: Manifest<'a>,
     sections: Sections<'a>,
 }
@@ -56,7 +58,7 @@ impl<'a> PolicyImage<'a> {
         let (manifest_bytes, body) = payload.split_at_checked(padded_length).ok_or(ImageError::Header)?;
         let manifest = Manifest::read(manifest_bytes, header.manifest_length)?;
         let sections = Sections::read(&manifest, body)?;
-        Ok(Self { bytes, manifest, sections })
+        Ok(Self { bytes, body, manifest, sections })
     }
 
     /// The exact bytes of the image, without what follows it.
@@ -67,6 +69,16 @@ impl<'a> PolicyImage<'a> {
     /// What the image says of itself.
     pub const fn manifest(&self) -> &Manifest<'a> {
         &self.manifest
+    }
+
+    /// The words of a section as they stand in the image.
+    pub fn words(&self, kind: SectionKind) -> &'a [u32] {
+        let section = self.manifest.sections.iter().find(|section| section.kind == kind);
+        let bytes = section.and_then(|section| {
+            let (offset, length) = (section.offset as usize, section.length as usize);
+            self.body.get(offset..)?.get(..length)
+        });
+        bytes.and_then(|bytes| bytemuck::try_cast_slice(bytes).ok()).unwrap_or_default()
     }
 
     /// The numbers, in place.

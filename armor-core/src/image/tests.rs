@@ -33,6 +33,9 @@ fn what_was_written_is_read_back_in_place() {
     for (read, written) in read.iter().zip(&parts.contents) {
         assert_eq!(&words(read), written);
     }
+    for (kind, written) in SectionKind::ALL.into_iter().zip(&parts.contents) {
+        assert_eq!(image.words(kind), written);
+    }
     assert_eq!((kappa_3.bias.len(), context.weights.len(), network.context_kappa.len()), (6, 3 * 5, 6 * 5));
 
     let chain = |index| numbers.chain(image.manifest(), index).collect::<Vec<_>>();

@@ -3,14 +3,19 @@
 use std::fmt;
 use std::path::PathBuf;
 
+use armor_core::image::{self, PolicyImage};
 use firmware_sim::cli::output::{CommandResult, Output};
 use firmware_sim::file;
 use serde::Serialize;
 
 use super::run_folder::export_folder;
 use crate::export::Agreement;
+use crate::quantize::{COST_BOUND, Drift, REWARD_BOUND, quantize};
 
 /// Write the policy of a run as an image for the controller.
+///
+/// A policy in integers is first compared with the one in single precision: on
+/// recorded states, and in flight where the task has a native plant.
 #[derive(Debug, clap::Args)]
 pub(super) struct Export {
     /// Folder of a run.
@@ -24,12 +29,27 @@ pub(super) struct Export {
     /// The run's recorded data, if it was moved.
     #[arg(long)]
     data: Option<PathBuf>,
+    /// Write the image even if integers change how the policy flies.
+    #[arg(long)]
+    accept_drift: bool,
 }
 
 #[derive(Clone, Copy, Debug, Serialize, clap::ValueEnum)]
 #[serde(rename_all = "snake_case")]
 enum Precision {
     F32,
+    Int16x8,
+    Int8,
+}
+
+impl From<Precision> for image::Precision {
+    fn from(precision: Precision) -> Self {
+        match precision {
+            Precision::F32 => Self::F32,
+            Precision::Int16x8 => Self::Int16x8,
+            Precision::Int8 => Self::Int8,
+        }
+    }
 }
 
 #[derive(Serialize)]
@@ -40,19 +60,40 @@ struct Report {
     steps: u64,
     #[serde(flatten)]
     agreement: Agreement,
+    drift: Drift,
 }
 
 impl Export {
     pub(super) fn run(self, output: Output) -> CommandResult {
-        let (checkpoint, exported) = export_folder(&self.dir, self.data.as_ref(), output)?;
-        file::write(&self.output, exported.bytes.as_slice())?;
-        output.report(&Report {
+        let (checkpoint, data, exported) = export_folder(&self.dir, self.data.as_ref(), output)?;
+        let (bytes, agreement, drift) = match self.precision {
+            Precision::F32 => (exported.bytes, exported.agreement, Drift::default()),
+            precision => {
+                let float = PolicyImage::new_checked(exported.bytes.as_slice())?;
+                let quantized = quantize(&float, &data, precision.into())?;
+                (quantized.bytes, quantized.agreement, quantized.drift)
+            }
+        };
+        let report = Report {
             image: self.output,
             precision: self.precision,
-            image_bytes: exported.bytes.as_slice().len(),
+            image_bytes: bytes.as_slice().len(),
             steps: checkpoint.state.step,
-            agreement: exported.agreement,
-        })
+            agreement,
+            drift,
+        };
+        if let Some(rung) = report.drift.beyond_bounds().filter(|_| !self.accept_drift) {
+            output.note(&report);
+            return Err(format!(
+                "refused to write {}: in {:?}, {rung}; reward may move by {REWARD_BOUND} and cost rise by {COST_BOUND}; \
+                 export as int16x8 or f32, or take it with --accept-drift",
+                report.image.display(),
+                report.precision,
+            )
+            .into());
+        }
+        file::write(&report.image, bytes.as_slice())?;
+        output.report(&report)
     }
 }
 
@@ -61,10 +102,13 @@ impl fmt::Display for Report {
         writeln!(f, "image               {}", self.image.display())?;
         writeln!(f, "size                {:>10} bytes", self.image_bytes)?;
         writeln!(f, "trained             {:>10} steps", self.steps)?;
-        write!(
-            f,
-            "agreement           {:>10.1e} largest difference of an action, {} samples",
-            self.agreement.agreement_max_abs, self.agreement.agreement_samples
-        )
+        let Agreement { agreement_max_abs, agreement_rms, agreement_samples } = self.agreement;
+        let other = if matches!(self.precision, Precision::F32) { "trainer" } else { "f32" };
+        writeln!(f, "actions against {other}, {agreement_samples} recorded states")?;
+        write!(f, "  largest difference{agreement_max_abs:>10.1e}, root mean square {agreement_rms:.1e}")?;
+        for rung in &self.drift.0 {
+            write!(f, "\n{rung}")?;
+        }
+        Ok(())
     }
 }

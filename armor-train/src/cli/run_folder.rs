@@ -10,19 +10,19 @@ use crate::export::{Exported, export};
 use crate::run::{Checkpoint, RunError};
 
 /// The policy of the last checkpoint in `folder`, exported in memory; `data`
-/// says where the recorded data is now, if it was moved.
+/// says where the recorded data is now, if it was moved. The data comes along.
 pub(super) fn export_folder(
     folder: &Path,
     data: Option<&PathBuf>,
     output: Output,
-) -> Result<(Checkpoint, Exported), Box<dyn std::error::Error>> {
+) -> Result<(Checkpoint, Dataset, Exported), Box<dyn std::error::Error>> {
     let checkpoint = Checkpoint::read(folder)?;
     let path = data.cloned().unwrap_or_else(|| PathBuf::from(&checkpoint.config.data));
     let data = super::data::read(&path, output)
         .map_err(|error| format!("{error}; name the run's recorded data with --data if it was moved"))?;
     same_data(&checkpoint, &data, folder)?;
     let exported = export(&checkpoint, &data)?;
-    Ok((checkpoint, exported))
+    Ok((checkpoint, data, exported))
 }
 
 fn same_data(checkpoint: &Checkpoint, data: &Dataset, folder: &Path) -> Result<(), RunError> {
@@ -38,5 +38,5 @@ pub(super) fn image(
     data: Option<&PathBuf>,
     output: Output,
 ) -> Result<AlignedBytes, Box<dyn std::error::Error>> {
-    if path.is_dir() { Ok(export_folder(path, data, output)?.1.bytes) } else { Ok(AlignedBytes::read(path)?) }
+    if path.is_dir() { Ok(export_folder(path, data, output)?.2.bytes) } else { Ok(AlignedBytes::read(path)?) }
 }

@@ -24,8 +24,24 @@ pub const AGREEMENT_BOUND: f32 = 1e-4;
 pub struct Agreement {
     /// Largest difference of an action entry.
     pub agreement_max_abs: f32,
+    /// Root mean square of the differences.
+    pub agreement_rms: f32,
     /// Recorded states and budgets compared.
     pub agreement_samples: usize,
+}
+
+impl Agreement {
+    /// Sums up the differences of all action entries, as magnitudes.
+    pub(crate) fn new(differences: &[f32], samples: usize) -> Self {
+        let squares: f64 = differences.iter().map(|&difference| f64::from(difference).powi(2)).sum();
+        // By total order a NaN is the largest, and not lost.
+        let largest = differences.iter().copied().max_by(f32::total_cmp);
+        Self {
+            agreement_max_abs: largest.unwrap_or_default(),
+            agreement_rms: (squares / differences.len().max(1) as f64).sqrt() as f32,
+            agreement_samples: samples,
+        }
+    }
 }
 
 /// Compares the controller's first action with the trainer's chain over random
@@ -56,13 +72,12 @@ pub fn agreement(
         Noise::new(sample as u64).fill_normal(stage as u32, 0, out);
     });
 
-    let mut largest = 0.0f32;
+    let mut differences = Vec::new();
     for (sample, (&row, &kappa)) in rows.iter().zip(&kappas).enumerate() {
         let mut controller = HostController::new(policy, CostLimit::from_cost(kappa), sample as u64)?;
         let step = controller.step(data.observation(row), 0.0);
-        for (flown, trained) in step.action.iter().zip(chain.action.column(sample).iter()) {
-            largest = largest.max((flown - trained).abs());
-        }
+        let trained = chain.action.column(sample);
+        differences.extend(step.action.iter().zip(trained.iter()).map(|(flown, trained)| (flown - trained).abs()));
     }
-    Ok(Agreement { agreement_max_abs: largest, agreement_samples: rows.len() })
+    Ok(Agreement::new(&differences, rows.len()))
 }

@@ -74,7 +74,11 @@ fn ladder(steps: u16) -> FixedVec<Rung, MAX_RUNGS> {
 }
 
 /// How each rung flies on the task's native plant; empty where there is none.
-fn quality(image: &PolicyImage<'_>, limit: CostLimit, seed: u64) -> Result<FixedVec<Quality, MAX_RUNGS>, ExportError> {
+pub(crate) fn quality(
+    image: &PolicyImage<'_>,
+    limit: CostLimit,
+    seed: u64,
+) -> Result<FixedVec<Quality, MAX_RUNGS>, ExportError> {
     let native = Task::named(image.manifest().task).ok().filter(|task| task.plant().is_ok());
     let Some(task) = native else { return Ok(FixedVec::new()) };
     let flown = image.manifest().rungs.iter().enumerate().map(|(rung, chain)| {
@@ -134,7 +138,8 @@ fn manifest<'a>(checkpoint: &'a Checkpoint, actor: &Actor, data: &Dataset) -> Ma
     }
 }
 
-fn build(manifest: &Manifest<'_>, sections: &[Vec<u32>; SECTION_COUNT]) -> Result<ImageBytes, ExportError> {
+/// Writes an image into memory of its size.
+pub(crate) fn build(manifest: &Manifest<'_>, sections: &[Vec<u32>; SECTION_COUNT]) -> Result<ImageBytes, ExportError> {
     let capacity = OVERHEAD + sections.iter().map(|words| (4 * words.len()).next_multiple_of(16)).sum::<usize>();
     let mut bytes = ImageBytes::filled(0, capacity);
     let length = write(manifest, &sections.each_ref().map(Vec::as_slice), bytes.as_mut_slice())?;

@@ -14,7 +14,7 @@ const LEAD: usize = 8;
 
 /// Flies `policy` over a stretch of the data's costliest trajectory; returns
 /// the words of the golden section.
-pub(super) fn record(policy: Policy<'_>, data: &Dataset, limit: CostLimit, seed: u64) -> Result<Vec<u32>, ExportError> {
+pub(crate) fn record(policy: Policy<'_>, data: &Dataset, limit: CostLimit, seed: u64) -> Result<Vec<u32>, ExportError> {
     let costliest = data.trajectories().iter().max_by(|a, b| a.cost_return.total_cmp(&b.cost_return));
     let rows = costliest.ok_or(ExportError::NoTrajectory)?.rows.clone();
     let first_cost = rows.clone().find(|&row| data.cost(row) > 0.0).unwrap_or(rows.start);

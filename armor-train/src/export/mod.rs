@@ -9,12 +9,14 @@ mod build;
 mod golden;
 mod sections;
 
-use armor_core::image::WriteError;
+use armor_core::image::{SectionKind, WriteError};
 use armor_infer::LoadError;
 use firmware_sim::memory::AlignedBytes;
 
 pub use agreement::{AGREEMENT_BOUND, AGREEMENT_SAMPLES, Agreement, agreement};
 pub use build::{Exported, export};
+pub(crate) use build::{build, quality};
+pub(crate) use golden::record as record_golden;
 
 /// Why a policy could not be exported.
 #[derive(Debug, thiserror::Error)]
@@ -39,6 +41,15 @@ pub enum ExportError {
         /// The largest difference.
         found: f32,
     },
+    /// A policy cannot be quantised twice.
+    #[error("only a policy in single precision can be quantised; export the run again")]
+    NotFloat,
+    /// There are no integers of single precision.
+    #[error("single precision has no integers; export it as f32")]
+    NotInteger,
+    /// A number of the network is too large for its place in an integer image.
+    #[error("the weights of {0:?} are too large for integers; export the policy as f32")]
+    Range(SectionKind),
     /// The data has no trajectory.
     #[error("the data has no trajectory to take a golden trace from")]
     NoTrajectory,

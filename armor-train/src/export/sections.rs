@@ -41,6 +41,7 @@ pub(super) fn sections(
         SectionKind::Hidden2 => layer(&body[0]),
         SectionKind::Hidden3 => layer(&body[1]),
         SectionKind::Output => layer(&body[2]),
+        SectionKind::Scales => Vec::new(),
         SectionKind::Chain => {
             let chain = |rung: &Rung| actor.process.chain(rung.sampler, rung.steps.into());
             rungs.iter().flat_map(chain).flat_map(|step| step.to_f32().to_words()).collect()

@@ -1,7 +1,8 @@
 //! The checks of an image, as an incoming inspection runs them.
 //!
 //! The image must be whole, reproduce its golden trace bit for bit, and agree
-//! with the plain f64 evaluation of its own numbers; and it must stop being
+//! with a second evaluation of its own numbers (in f64 to rounding, in integers
+//! exactly); and it must stop being
 //! accepted when any bit of it changes or any byte of it is missing.
 
 mod corruption;
@@ -15,10 +16,6 @@ use serde::Serialize;
 
 use crate::host::{self, HostController};
 use crate::reference::Reference;
-
-/// The largest difference of an action entry between controller and reference
-/// that is put down to single precision.
-pub const AGREEMENT_BOUND: f64 = 1e-4;
 
 /// What the checks of an image found.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -92,23 +89,27 @@ impl Verification {
     }
 
     fn agreement(&mut self, image: &PolicyImage<'_>) {
-        let outcome = largest_difference(image).and_then(|largest| {
+        let reference = Reference::new(image);
+        let outcome = largest_difference(image, &reference).and_then(|largest| {
             self.agreement_max_abs = Some(largest);
-            let detail = format!("largest difference from the f64 reference {largest:.1e}");
+            let (name, bound) = match reference {
+                Reference::Float(_) => ("f64", reference.tolerance()),
+                Reference::Integer(_) => ("integer", reference.tolerance()),
+            };
+            let detail = format!("largest difference from the {name} reference {largest:.1e}");
             // A NaN is no agreement.
-            if largest <= AGREEMENT_BOUND { Ok(detail) } else { Err(format!("{detail}, above {AGREEMENT_BOUND:.0e}")) }
+            if largest <= bound { Ok(detail) } else { Err(format!("{detail}, above {bound:.0e}")) }
         });
         self.push("agreement", outcome);
     }
 }
 
 /// Flies the golden trace's states and costs on controller and reference.
-fn largest_difference(image: &PolicyImage<'_>) -> Result<f64, String> {
+fn largest_difference(image: &PolicyImage<'_>, reference: &Reference) -> Result<f64, String> {
     let golden = &image.sections().golden;
     let policy = Policy::load(image).map_err(|error| error.to_string())?;
     let limit = CostLimit::from_cost(golden.limit);
     let mut controller = HostController::new(policy, limit, golden.seed).map_err(|error| error.to_string())?;
-    let reference = Reference::new(image);
     let mut differences = Vec::new();
     for (tick, row) in (0..).zip(golden.rows()) {
         let step = controller.step(row.state, row.incurred);

@@ -1,20 +1,18 @@
-//! A second opinion on the controller: the chain of an image in plain f64.
+//! The chain of a single-precision image in plain f64.
 //!
-//! Written from the paper's formulas and the image's sections, with nothing
-//! hoisted and no code of `armor-infer`: layer 1 multiplies one concatenated
-//! vector (Appendix B), Mish is spelt out with `tanh` and `ln`, and each step
-//! is Eq. 12 as [`armor_core::schedule::ChainStep`] states it. Only the noise
-//! is shared, for it is addressed and not computed.
+//! Nothing is hoisted: layer 1 multiplies one concatenated vector (Appendix
+//! B), Mish is spelt out with `tanh` and `ln`, and each step is Eq. 12 as
+//! [`armor_core::schedule::ChainStep`] states it.
 
-use armor_core::image::{Dense, PolicyImage};
-use armor_core::noise::Noise;
+use armor_core::image::{Dense, FloatNetwork, PolicyImage};
 use armor_core::schedule::ChainStep;
 use armor_core::units::Cost;
 use nalgebra::{DMatrix, DVector};
-use serde::Serialize;
+
+use super::{Chain, ChainRow, draws};
 
 /// An image's network and chains in f64.
-pub struct Reference {
+pub struct FloatReference {
     state_mean: DVector<f64>,
     state_factor: DVector<f64>,
     action_low: DVector<f64>,
@@ -36,42 +34,11 @@ struct Layer {
     bias: DVector<f64>,
 }
 
-/// Every number of one chain.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Chain {
-    /// The state as the network sees it `[S]`.
-    pub state_normalized: Vec<f64>,
-    /// The embedding of the remaining budget `[E]`.
-    pub kappa_embedding: Vec<f64>,
-    /// The pure noise that the chain starts from, `a^N` `[A]`.
-    pub start: Vec<f64>,
-    /// The steps, from noise level `N` down.
-    pub steps: Vec<ChainRow>,
-    /// What the chain ends in `[A]`.
-    pub action: Vec<f64>,
-}
-
-/// Every number of one step of a chain.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct ChainRow {
-    /// The noise level `n` that the step starts from.
-    pub n: usize,
-    /// The noise that the network sees `[A]`.
-    pub eps: Vec<f64>,
-    /// The estimate of the action, clipped to the bounds `[A]`.
-    pub x0: Vec<f64>,
-    /// The standard normal draws of the step `[A]`; 0 where none are added.
-    pub noise: Vec<f64>,
-    /// The noisy action after the step `[A]`.
-    pub action: Vec<f64>,
-}
-
-impl Reference {
-    /// The network and chains of an image.
-    pub fn new(image: &PolicyImage<'_>) -> Self {
+impl FloatReference {
+    pub(super) fn new(image: &PolicyImage<'_>, network: &FloatNetwork<'_>) -> Self {
         let (manifest, numbers) = (image.manifest(), image.sections());
         let hidden = usize::from(manifest.shape.hidden);
-        let layer_1 = [numbers.action_input, numbers.context_state.weights, numbers.context_kappa].concat();
+        let layer_1 = [network.action_input, network.context_state.weights, network.context_kappa].concat();
         Self {
             state_mean: vector(numbers.state_mean),
             state_factor: vector(numbers.state_factor),
@@ -79,28 +46,19 @@ impl Reference {
             action_high: vector(numbers.action_high),
             kappa_scale: manifest.kappa.scale.into(),
             kappa: numbers.kappa.map(|dense| layer(&dense)),
-            layer_1: layer(&Dense { weights: &layer_1, bias: numbers.context_state.bias }),
-            time: matrix(hidden, numbers.time_table),
-            layer_2: layer(&numbers.hidden_2),
-            layer_3: layer(&numbers.hidden_3),
-            output: layer(&numbers.output),
+            layer_1: layer(&Dense { weights: &layer_1, bias: network.context_state.bias }),
+            time: matrix(hidden, network.time_table),
+            layer_2: layer(&network.hidden_2),
+            layer_3: layer(&network.hidden_3),
+            output: layer(&network.output),
             rungs: (0..manifest.rungs.len()).map(|rung| numbers.chain(manifest, rung).collect()).collect(),
         }
     }
 
-    /// The chain of `rung` that a controller of `seed` flies at control step
-    /// `tick`, from a state `[S]` and what is left of its budget.
-    ///
-    /// # Panics
-    /// Where the image has no such rung, or the state not its length.
-    pub fn chain(&self, rung: usize, state: &[f32], kappa: Cost, seed: u64, tick: u64) -> Chain {
+    pub(super) fn chain(&self, rung: usize, state: &[f32], kappa: Cost, seed: u64, tick: u64) -> Chain {
         let state = (vector(state) - &self.state_mean).component_mul(&self.state_factor);
         let embedding = self.kappa_embedding(kappa);
-        let draws = |stream: u32| {
-            let mut draws = vec![0.0; self.action_low.len()];
-            Noise::new(seed).fill_normal(stream, tick, &mut draws);
-            vector(&draws)
-        };
+        let draws = |stream| vector(&draws(self.action_low.len(), seed, stream, tick));
         let start = draws(0);
         let mut action = start.clone();
         let mut steps = Vec::new();
@@ -172,6 +130,3 @@ fn vector(values: &[f32]) -> DVector<f64> {
 fn list(vector: &DVector<f64>) -> Vec<f64> {
     vector.iter().copied().collect()
 }
-
-#[cfg(test)]
-mod tests;
