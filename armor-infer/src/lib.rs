@@ -10,8 +10,8 @@
 //! |---|---|
 //! | section 3.5, the control loop | `controller.rs` |
 //! | Eq. 12, the reverse process | `sampler.rs` |
-//! | Appendix B, the denoiser | `denoiser.rs` |
-//! | its matrix-vector products, in one order | `kernel/` |
+//! | Appendix B, the denoiser | `denoiser/` |
+//! | its products and activations, bit for bit on every machine | `kernel/` |
 //! | - (the wire to a robot or its simulator, `docs/link.md`) | `link/` |
 //! | - (the budget across resets, in flash) | `journal.rs`, `log.rs` |
 //!
@@ -48,9 +48,9 @@
 //! ```
 
 #![no_std]
-#![forbid(unsafe_code)]
+#![deny(unsafe_code)]
 
-#[cfg(test)]
+#[cfg(any(test, feature = "std"))]
 extern crate std;
 
 mod controller;

@@ -54,7 +54,7 @@ pub enum LoadError {
         /// The largest limit that the policy may be given.
         trained_max: Cost,
     },
-    /// There is no kernel for the number format of the policy.
+    /// The firmware was built without the number format of the policy.
     Precision(Precision),
 }
 
@@ -77,9 +77,10 @@ impl fmt::Display for LoadError {
                 f,
                 "cost limit {limit} lies above what the policy was trained with; set a limit of at most {trained_max}"
             ),
-            Self::Precision(precision) => {
-                write!(f, "this controller has no kernel for {precision:?}; export the policy again as F32")
-            }
+            Self::Precision(precision) => write!(
+                f,
+                "the controller was built without {precision:?}; build armor-infer with the feature float or integer, or export the policy in another precision"
+            ),
         }
     }
 }
@@ -94,6 +95,13 @@ impl<'a> Policy<'a> {
     /// that the policy is given to.
     pub fn load(image: &PolicyImage<'a>) -> Result<Self, LoadError> {
         let manifest = image.manifest();
+        let built = match manifest.precision {
+            Precision::F32 => cfg!(feature = "float"),
+            Precision::Int16x8 | Precision::Int8 => cfg!(feature = "integer"),
+        };
+        if !built {
+            return Err(LoadError::Precision(manifest.precision));
+        }
         Ok(Self {
             shape: manifest.shape,
             kappa: manifest.kappa,
@@ -102,6 +110,17 @@ impl<'a> Policy<'a> {
             sections: *image.sections(),
             chains: core::array::from_fn(|rung| image.sections().chain_words(manifest, rung)),
         })
+    }
+
+    /// The same policy on another kernel, for comparison: the bits are equal.
+    #[must_use]
+    pub const fn with_kernel(self, kernel: Kernel) -> Self {
+        Self { kernel, ..self }
+    }
+
+    /// The kernel that the policy runs on: at first [`Kernel::best`].
+    pub const fn kernel(&self) -> Kernel {
+        self.kernel
     }
 
     /// Dimensions of the policy network.

@@ -42,21 +42,29 @@ impl<const STATE: usize, const HIDDEN: usize> Denoiser<STATE, HIDDEN> {
     /// chain's estimate shows them.
     pub(crate) fn prepare(&mut self, policy: &Policy<'_>, state: &[f32], kappa: Cost) -> Result<(), NotFinite> {
         match (self, &policy.sections.network) {
-            (Self::Float(memory), Network::Float(network)) => memory.prepare(policy, network, state, kappa),
-            (Self::Integer(memory), Network::Integer(network)) => memory.prepare(policy, network, state, kappa)?,
-            // A denoiser is made for the policy that it is given.
-            (Self::Float(_), Network::Integer(_)) | (Self::Integer(_), Network::Float(_)) => return Err(NotFinite),
+            (Self::Float(memory), Network::Float(network)) if cfg!(feature = "float") => {
+                memory.prepare(policy, network, state, kappa);
+                Ok(())
+            }
+            (Self::Integer(memory), Network::Integer(network)) if cfg!(feature = "integer") => {
+                memory.prepare(policy, network, state, kappa)
+            }
+            // A policy loads only where its format was built in, and memory is made for its policy.
+            _ => Err(NotFinite),
         }
-        Ok(())
     }
 
     /// The noise that the network sees in `action` `[A]` at noise level `n`,
     /// into `eps` `[A]`, given what [`Denoiser::prepare`] left.
     pub(crate) fn eps(&mut self, policy: &Policy<'_>, n: usize, action: &[f32], eps: &mut [f32]) {
         match (self, &policy.sections.network) {
-            (Self::Float(memory), Network::Float(network)) => memory.eps(policy, network, n, action, eps),
-            (Self::Integer(memory), Network::Integer(network)) => memory.eps(policy, network, n, action, eps),
-            (Self::Float(_), Network::Integer(_)) | (Self::Integer(_), Network::Float(_)) => {}
+            (Self::Float(memory), Network::Float(network)) if cfg!(feature = "float") => {
+                memory.eps(policy, network, n, action, eps);
+            }
+            (Self::Integer(memory), Network::Integer(network)) if cfg!(feature = "integer") => {
+                memory.eps(policy, network, n, action, eps);
+            }
+            _ => {}
         }
     }
 }

@@ -5,20 +5,53 @@
 //! over those of the five operations that it does better and leaves the others
 //! to the portable code, which says what their results must be.
 
+#[cfg(all(feature = "std", target_arch = "x86_64"))]
+mod avx2;
 mod float;
 mod integer;
+#[cfg(test)]
+mod tests;
 
 /// The instructions that a policy's arithmetic runs on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kernel {
     /// What the compiler makes of plain loops.
     Portable,
+    /// 256-bit vectors, on x86-64 with the feature `std`.
+    #[cfg(all(feature = "std", target_arch = "x86_64"))]
+    Avx2(avx2::Avx2),
 }
 
+/// Outputs whose single-precision sums portable code keeps in registers: eight
+/// SSE registers, as many as two additions a cycle of latency four keep busy.
+#[cfg(not(target_arch = "arm"))]
+const WIDE: usize = 32;
+/// Half of the 32 single-precision registers of a Cortex-M FPU.
+#[cfg(target_arch = "arm")]
+const WIDE: usize = 16;
+
 impl Kernel {
+    /// The kernels that this machine can run, the fastest last.
+    pub fn available() -> impl Iterator<Item = Self> {
+        #[cfg(all(feature = "std", target_arch = "x86_64"))]
+        let more = avx2::Avx2::detect().map(Self::Avx2);
+        #[cfg(not(all(feature = "std", target_arch = "x86_64")))]
+        let more = None;
+        core::iter::once(Self::Portable).chain(more)
+    }
+
     /// The fastest kernel of this machine.
     pub fn best() -> Self {
-        Self::Portable
+        Self::available().last().unwrap_or(Self::Portable)
+    }
+
+    /// The kernel's name in reports.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Portable => "portable",
+            #[cfg(all(feature = "std", target_arch = "x86_64"))]
+            Self::Avx2(_) => "avx2",
+        }
     }
 
     /// For a matrix from `I` inputs to `O` outputs, stored input by input,
@@ -34,7 +67,9 @@ impl Kernel {
     /// left out.
     pub(crate) fn accumulate(self, weights: &[f32], x: &[f32], out: &mut [f32]) {
         match self {
-            Self::Portable => float::accumulate(weights, x, out),
+            Self::Portable => float::accumulate::<WIDE>(weights, x, out),
+            #[cfg(all(feature = "std", target_arch = "x86_64"))]
+            Self::Avx2(kernel) => kernel.accumulate(weights, x, out),
         }
     }
 
@@ -42,6 +77,8 @@ impl Kernel {
     pub(crate) fn mish(self, values: &mut [f32]) {
         match self {
             Self::Portable => float::mish(values),
+            #[cfg(all(feature = "std", target_arch = "x86_64"))]
+            Self::Avx2(kernel) => kernel.mish(values),
         }
     }
 
@@ -52,18 +89,22 @@ impl Kernel {
     /// keep their sum.
     ///
     /// [`fixed::MAX_TERMS`]: armor_core::fixed::MAX_TERMS
+    #[cfg_attr(not(all(feature = "std", target_arch = "x86_64")), expect(unused_variables))]
     pub(crate) fn sum_rows(self, weights: &[i8], codes: &[i16], bits: u32, sums: &mut [i32]) {
-        let _ = bits;
         match self {
             Self::Portable => integer::sum_rows(weights, codes, sums),
+            #[cfg(all(feature = "std", target_arch = "x86_64"))]
+            Self::Avx2(kernel) => kernel.sum_rows(weights, codes, bits, sums),
         }
     }
 
     /// Sums over codes of `bits` become pre-activations
     /// ([`armor_core::fixed::rescale`]), in place.
-    pub(crate) fn rescale(self, sums: &mut [i32], bits: u32, multiplier: &[i32], rescale: i32, bias: &[i32]) {
+    pub(crate) fn rescale(self, sums: &mut [i32], bits: u32, multiplier: &[i32], factor: i32, bias: &[i32]) {
         match self {
-            Self::Portable => integer::rescale(sums, bits, multiplier, rescale, bias),
+            Self::Portable => integer::rescale(sums, bits, multiplier, factor, bias),
+            #[cfg(all(feature = "std", target_arch = "x86_64"))]
+            Self::Avx2(kernel) => kernel.rescale(sums, bits, multiplier, factor, bias),
         }
     }
 
@@ -71,6 +112,8 @@ impl Kernel {
     pub(crate) fn activate(self, pre: &[i32], factor: i32, bits: u32, codes: &mut [i16]) {
         match self {
             Self::Portable => integer::activate(pre, factor, bits, codes),
+            #[cfg(all(feature = "std", target_arch = "x86_64"))]
+            Self::Avx2(kernel) => kernel.activate(pre, factor, bits, codes),
         }
     }
 }
