@@ -117,27 +117,21 @@ fn sum_in_chunks<T, const N: usize>(
     let (blocks, rest) = sums.as_chunks_mut::<ROWS>();
     let mut groups = weights.chunks_exact(ROWS * stride);
     for (block, group) in blocks.iter_mut().zip(&mut groups) {
-        let mut rows = group.chunks_exact(stride);
-        let rows: [&[i8]; ROWS] = core::array::from_fn(|_| rows.next().unwrap_or_default());
-        let mut partial = [_mm256_setzero_si256(); ROWS];
-        for (chunk, codes) in chunks.iter().enumerate() {
-            for (sum, row) in partial.iter_mut().zip(&rows) {
-                if let Some(weights) = row.get(chunk * N..).and_then(<[i8]>::first_chunk::<N>) {
-                    *sum = add(*sum, weights, codes);
-                }
-            }
+        let mut rows = group.chunks_exact(stride).map(|row| row.as_chunks::<N>());
+        let [a, b, c, d]: [_; ROWS] = core::array::from_fn(|_| rows.next().unwrap_or_default());
+        let [mut sum_a, mut sum_b, mut sum_c, mut sum_d] = [_mm256_setzero_si256(); ROWS];
+        for ((((codes, a), b), c), d) in chunks.iter().zip(a.0).zip(b.0).zip(c.0).zip(d.0) {
+            sum_a = add(sum_a, a, codes);
+            sum_b = add(sum_b, b, codes);
+            sum_c = add(sum_c, c, codes);
+            sum_d = add(sum_d, d, codes);
         }
-        let [a, b, c, d] = partial;
-        let pairs = _mm256_hadd_epi32(_mm256_hadd_epi32(a, b), _mm256_hadd_epi32(c, d));
+        let pairs = _mm256_hadd_epi32(_mm256_hadd_epi32(sum_a, sum_b), _mm256_hadd_epi32(sum_c, sum_d));
         let total = _mm_add_epi32(_mm256_castsi256_si128(pairs), _mm256_extracti128_si256::<1>(pairs));
         // SAFETY: a block is 16 bytes, and needs no alignment.
         unsafe { _mm_storeu_si128(block.as_mut_ptr().cast(), total) };
-        if !tail.is_empty() {
-            for (sum, row) in block.iter_mut().zip(&rows) {
-                let mut last = [0];
-                integer::sum_rows(row.get(chunks.len() * N..).unwrap_or_default(), tail, &mut last);
-                *sum += last[0];
-            }
+        for (sum, (_, weights)) in block.iter_mut().zip([a, b, c, d]) {
+            *sum += weights.iter().zip(tail).map(|(weight, code)| i32::from(*weight) * i32::from(*code)).sum::<i32>();
         }
     }
     integer::sum_rows(weights.get(blocks.len() * ROWS * stride..).unwrap_or_default(), codes, rest);

@@ -1,43 +1,49 @@
 //! `firmware-sim bench`
 
 use std::fmt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use armor_core::image::PolicyImage;
+use armor_core::image::{PolicyImage, Precision};
 use armor_core::noise::Noise;
 use armor_core::units::CostLimit;
-use armor_infer::{LoadError, Policy};
+use armor_infer::{Kernel, LoadError, Policy};
 use serde::Serialize;
 
 use super::output::{CommandResult, Output};
 use super::sampler_name;
 use crate::host::HostController;
-use crate::image_file::ImageFile;
+use crate::image_file::{ImageFile, NotAnImage};
 use crate::latency::{Latency, Quantiles};
 
-/// Actions that are timed.
-const ACTIONS: u64 = 1000;
+/// Rounds in which all rows take turns, so that a busy moment of this host falls on all of them.
+const ROUNDS: u64 = 10;
+/// Actions of a row in a round that are timed.
+const ACTIONS: u64 = 100;
 /// Actions before those, untimed, for caches and the processor's clock.
-const WARM_UP: u64 = 50;
+const WARM_UP: u64 = 10;
 
-/// Measure what an action takes on this host, on every rung of the image.
+/// Measure what an action takes on this host, on every rung of the images and
+/// every kernel of this processor.
 #[derive(Debug, clap::Args)]
 pub(super) struct Bench {
-    /// The policy image.
-    image: PathBuf,
+    /// The policy images.
+    #[arg(required = true, value_name = "IMAGE")]
+    images: Vec<PathBuf>,
 }
 
 #[derive(Serialize)]
 struct Report {
-    task: String,
-    image_bytes: usize,
     rungs: Vec<Row>,
 }
 
-/// What one rung takes.
+/// What one rung takes on one kernel.
 #[derive(Serialize)]
 struct Row {
+    image: PathBuf,
+    image_bytes: usize,
+    precision: Precision,
+    kernel: &'static str,
     rung: usize,
     sampler: &'static str,
     steps: u16,
@@ -47,72 +53,103 @@ struct Row {
     quantiles: Quantiles,
     actions_per_second: f64,
     #[serde(skip)]
-    latency: Latency,
+    durations: Vec<Duration>,
 }
 
 impl Bench {
     pub(super) fn run(self, output: Output) -> CommandResult {
-        let file = ImageFile::read(&self.image)?;
-        let image = file.image()?;
-        output.note(format_args!("timing {ACTIONS} actions of {}", self.image.display()));
-        let manifest = image.manifest();
-        let mut rungs = Vec::new();
-        for (rung, flown) in manifest.rungs.iter().enumerate() {
-            let durations = time(&image, flown.steps.into())?;
-            let total: Duration = durations.iter().sum();
-            let latency: Latency = durations.into_iter().collect();
-            rungs.push(Row {
-                rung,
-                sampler: sampler_name(flown.sampler),
-                steps: flown.steps,
-                macs_per_action: manifest.shape.macs_once() + u64::from(flown.steps) * manifest.shape.macs_per_step(),
-                actions: ACTIONS,
-                quantiles: latency.quantiles(),
-                actions_per_second: ACTIONS as f64 / total.as_secs_f64(),
-                latency,
-            });
+        let files = self.images.iter().map(|path| ImageFile::read(path)).collect::<Result<Vec<_>, _>>()?;
+        let images = files.iter().map(ImageFile::image).collect::<Result<Vec<_>, NotAnImage>>()?;
+        output.note(format_args!("timing {} actions of every rung on every kernel", ROUNDS * ACTIONS));
+        let mut rows = Vec::new();
+        for (path, image) in self.images.iter().zip(&images) {
+            for kernel in Kernel::available() {
+                let rungs = 0..image.manifest().rungs.len();
+                rows.extend(rungs.map(|rung| (image, kernel, Row::new(path, image, kernel, rung))));
+            }
         }
-        output.report(&Report { task: manifest.task.into(), image_bytes: image.bytes().len(), rungs })
+        for round in 0..ROUNDS {
+            for (image, kernel, row) in &mut rows {
+                row.time(image, *kernel, round)?;
+            }
+        }
+        output.report(&Report { rungs: rows.into_iter().map(|(.., row)| row.finish()).collect() })
     }
 }
 
-/// Times actions in states as the network was trained to see them, normal
-/// after normalisation, by the longest rung of at most `steps` calls of the denoiser.
-fn time(image: &PolicyImage<'_>, steps: usize) -> Result<Vec<Duration>, LoadError> {
-    let numbers = image.sections();
-    let limit = CostLimit::from_cost(image.manifest().kappa.trained_max);
-    let mut controller = HostController::new(Policy::load(image)?, limit, 0)?;
-    let mut state = vec![0.0; numbers.state_mean.len()];
-    let mut durations = Vec::new();
-    for tick in 0..WARM_UP + ACTIONS {
-        Noise::new(0).fill_normal(0, tick, &mut state);
-        for ((entry, mean), factor) in state.iter_mut().zip(numbers.state_mean).zip(numbers.state_factor) {
-            *entry = mean + if *factor == 0.0 { 0.0 } else { *entry / factor };
-        }
-        let started = Instant::now();
-        std::hint::black_box(controller.step_within(&state, 0.0, steps));
-        let duration = started.elapsed();
-        if tick >= WARM_UP {
-            durations.push(duration);
+impl Row {
+    fn new(path: &Path, image: &PolicyImage<'_>, kernel: Kernel, rung: usize) -> Self {
+        let manifest = image.manifest();
+        let flown = manifest.rungs[rung];
+        Self {
+            image: path.into(),
+            image_bytes: image.bytes().len(),
+            precision: manifest.precision,
+            kernel: kernel.name(),
+            rung,
+            sampler: sampler_name(flown.sampler),
+            steps: flown.steps,
+            macs_per_action: manifest.shape.macs_once() + u64::from(flown.steps) * manifest.shape.macs_per_step(),
+            actions: 0,
+            quantiles: Quantiles::default(),
+            actions_per_second: 0.0,
+            durations: Vec::new(),
         }
     }
-    Ok(durations)
+
+    /// Times actions in states as the network was trained to see them, normal
+    /// after normalisation.
+    fn time(&mut self, image: &PolicyImage<'_>, kernel: Kernel, round: u64) -> Result<(), LoadError> {
+        let numbers = image.sections();
+        let limit = CostLimit::from_cost(image.manifest().kappa.trained_max);
+        let policy = Policy::load(image)?.with_kernel(kernel);
+        let mut controller = HostController::new(policy, limit, round)?;
+        let mut state = vec![0.0; numbers.state_mean.len()];
+        for tick in 0..WARM_UP + ACTIONS {
+            Noise::new(round).fill_normal(0, tick, &mut state);
+            for ((entry, mean), factor) in state.iter_mut().zip(numbers.state_mean).zip(numbers.state_factor) {
+                *entry = mean + if *factor == 0.0 { 0.0 } else { *entry / factor };
+            }
+            let started = Instant::now();
+            std::hint::black_box(controller.step_within(&state, 0.0, self.steps.into()));
+            let duration = started.elapsed();
+            if tick >= WARM_UP {
+                self.durations.push(duration);
+            }
+        }
+        Ok(())
+    }
+
+    fn finish(self) -> Self {
+        let total: Duration = self.durations.iter().sum();
+        let actions = self.durations.len() as u64;
+        let latency: Latency = self.durations.iter().copied().collect();
+        Self {
+            actions,
+            quantiles: latency.quantiles(),
+            actions_per_second: actions as f64 / total.as_secs_f64(),
+            ..self
+        }
+    }
 }
 
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "{}, {} bytes of image", self.task, self.image_bytes)?;
-        writeln!(f, "rung  chain       MAC/action   median us      p99 us   actions/s")?;
+        write!(f, "precision  kernel    rung  chain      MAC/action   median us      p99 us")?;
+        let mut image = None;
         for row in &self.rungs {
-            let chain = format!("{} {}", row.sampler, row.steps);
+            if image != Some(&row.image) {
+                write!(f, "\n{}, {} bytes", row.image.display(), row.image_bytes)?;
+                image = Some(&row.image);
+            }
+            let (precision, chain) = (format!("{:?}", row.precision), format!("{} {}", row.sampler, row.steps));
             let Quantiles { latency_us_p50, latency_us_p99, .. } = row.quantiles;
-            writeln!(
+            write!(
                 f,
-                "{:>4}  {chain:<10}{:>12}{latency_us_p50:>12.1}{latency_us_p99:>12.1}{:>12.0}",
-                row.rung, row.macs_per_action, row.actions_per_second
+                "\n  {precision:<9}{:<10}{:>4}  {chain:<9}{:>12}{latency_us_p50:>12.1}{latency_us_p99:>12.1}",
+                row.kernel, row.rung, row.macs_per_action
             )?;
         }
-        let Some(longest) = self.rungs.first() else { return Ok(()) };
-        write!(f, "\nhost latency of an action on rung 0\n{}", longest.latency.to_string().trim_end())
+        Ok(())
     }
 }
