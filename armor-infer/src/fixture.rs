@@ -1,7 +1,8 @@
 //! Policy images with random weights, for tests.
 
 use armor_core::image::{
-    ALIGNMENT, KappaRange, Manifest, PolicyImage, Precision, Provenance, Rung, SECTION_COUNT, SectionKind, write,
+    ALIGNMENT, KappaRange, LevelScales, Manifest, PolicyImage, Precision, Provenance, Rung, SECTION_COUNT, SectionKind,
+    write,
 };
 use armor_core::noise::Noise;
 use armor_core::schedule::{Sampler, Schedule};
@@ -81,6 +82,52 @@ impl Fixture {
         let mut parts = Parts { manifest, contents: contents.into() };
         parts.set_bounds(-1.0, 1.0);
         parts.set_rungs(&[(Sampler::Ddpm, shape.steps)]);
+        parts
+    }
+
+    /// The same in integers, with random codes for weights; scales are such that
+    /// the activations use a good part of their codes.
+    pub(crate) fn integers(shape: Shape, precision: Precision, seed: u64) -> Parts {
+        let mut parts = Self::random(shape, seed);
+        let bits = precision.code_bits().unwrap();
+        parts.manifest.precision = precision;
+        let [s, a, h, e, n] =
+            [shape.state, shape.action, shape.hidden, shape.kappa_embedding, shape.steps].map(usize::from);
+        let random = |kind: SectionKind, bytes: usize| {
+            let word = |i| Noise::new(seed).words(100 + kind as u32, i, 0)[0];
+            (0..bytes.div_ceil(4) as u64).map(word).collect::<Vec<u32>>()
+        };
+        let multiplier = vec![1 << 30; h];
+        let bias: Vec<u32> = (0..h as u32).map(|o| (o % 7 * 500).wrapping_sub(1500)).collect();
+        let rows = |kind, inputs: usize| [random(kind, h * inputs), multiplier.clone()].concat();
+        let hidden = |kind| [rows(kind, h), bias.clone()].concat();
+        let root = |width: usize| (width as f32).sqrt();
+        let unit = |width: usize| (2f32.powi(25) / root(width)).to_bits();
+        let range = 4.0 / ((1u32 << bits) - 1) as f32;
+        let level = LevelScales {
+            activate: [(512.0 / range) as i32, (512.0 / range) as i32, (512.0 * 32767.0 / 4.0) as i32],
+            rescale: [(2f32.powi(26) / root(h)) as i32; 2],
+            last_scale: 4.0 / 32767.0,
+        };
+        let output = [random(SectionKind::Output, 2 * a * h), vec![(1.0 / 16256.0 / root(h)).to_bits(); a], vec![0; a]];
+        let header = [unit(s), unit(e), 4000f32.to_bits(), 0, 16];
+        for (kind, words) in [
+            (
+                SectionKind::Context,
+                [rows(SectionKind::Context, s), rows(SectionKind::Kappa3, e), bias.clone()].concat(),
+            ),
+            (
+                SectionKind::TimeTable,
+                random(SectionKind::TimeTable, 2 * n * h).iter().map(|w| w & 0x07FF_07FF).collect(),
+            ),
+            (SectionKind::ActionInput, random(SectionKind::ActionInput, 2 * a * h)),
+            (SectionKind::Hidden2, hidden(SectionKind::Hidden2)),
+            (SectionKind::Hidden3, hidden(SectionKind::Hidden3)),
+            (SectionKind::Output, output.concat()),
+            (SectionKind::Scales, [&header[..], &level.to_words().repeat(n)].concat()),
+        ] {
+            *parts.section(kind) = words;
+        }
         parts
     }
 

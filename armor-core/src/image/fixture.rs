@@ -89,6 +89,34 @@ impl Parts {
         Self { manifest, contents }
     }
 
+    /// The same in integers: every byte of a matrix is its own number.
+    pub(super) fn integers(shape: Shape) -> Self {
+        let mut parts = Self::new(shape);
+        parts.manifest.precision = Precision::Int8;
+        let [s, a, h, e, n] =
+            [shape.state, shape.action, shape.hidden, shape.kappa_embedding, shape.steps].map(usize::from);
+        let matrix = |count: usize| (0..count.div_ceil(4) as u32).map(|i| 0x0403_0201u32.wrapping_mul(i + 1));
+        let rows = |inputs: usize| matrix(h * inputs).chain(1..=h as u32).collect::<Vec<u32>>();
+        let bias = || (0..h as u32).map(|o| 10u32.wrapping_sub(o)).collect::<Vec<u32>>();
+        let level = |n: u32| [n, n + 1, n + 2, n + 3, n + 4, 0.5f32.to_bits()];
+        for (kind, words) in [
+            (SectionKind::Context, [rows(s), rows(e), bias()].concat()),
+            (SectionKind::TimeTable, matrix(2 * n * h).collect()),
+            (SectionKind::ActionInput, matrix(2 * a * h).collect()),
+            (SectionKind::Hidden2, [rows(h), bias()].concat()),
+            (SectionKind::Hidden3, [rows(h), bias()].concat()),
+            (SectionKind::Output, matrix(2 * a * h).chain((0..2 * a as u32).map(|i| word(9, i))).collect()),
+            (
+                SectionKind::Scales,
+                [[1.5f32, 2.5, 3.5].map(f32::to_bits).to_vec(), vec![1, 9], (1..=n as u32).flat_map(level).collect()]
+                    .concat(),
+            ),
+        ] {
+            *parts.section(kind) = words;
+        }
+        parts
+    }
+
     pub(super) fn section(&mut self, kind: SectionKind) -> &mut Vec<u32> {
         &mut self.contents[kind as usize]
     }
@@ -107,7 +135,13 @@ impl Parts {
     /// Why these parts make no image.
     #[track_caller]
     pub(super) fn fault(&self) -> ImageError {
-        match self.write_into(Aligned::zeros(4096).bytes()) {
+        self.fault_within(4096)
+    }
+
+    /// The same, for parts that take up to `room` bytes.
+    #[track_caller]
+    pub(super) fn fault_within(&self, room: usize) -> ImageError {
+        match self.write_into(Aligned::zeros(room).bytes()) {
             Err(WriteError::Invalid(error)) => error,
             other => panic!("{other:?}"),
         }

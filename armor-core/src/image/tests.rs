@@ -1,6 +1,8 @@
 use super::fixture::{Aligned, Parts, SHAPE, TINY, resealed, seal, word, words};
 use super::*;
 use crate::schedule::{ChainStep, Sampler, Schedule};
+use crate::shape::Shape;
+use std::vec;
 use std::vec::Vec;
 
 #[test]
@@ -203,5 +205,92 @@ fn bounds_hold_the_fallback() {
         let mut parts = Parts::new(SHAPE);
         parts.section(SectionKind::ActionBounds)[at] = value.to_bits();
         assert_eq!(parts.fault(), ImageError::Bounds);
+    }
+}
+
+#[test]
+fn integers_that_were_written_are_read_back_in_place() {
+    let parts = Parts::integers(SHAPE);
+    let (mut memory, _) = parts.build();
+    let image = PolicyImage::new_checked(memory.bytes()).unwrap();
+    let Network::Integer(network) = image.sections().network else { panic!("the fixture is in integers") };
+    // Words 1, 2, 3, ... times 0x04030201, byte by byte; the last word of a part is not used up.
+    let bytes = |count: usize| (0..count as u32).map(|i| ((0x0403_0201 * (i / 4 + 1)) >> (8 * (i % 4))) as i8);
+    let rows = |rows: Rows<'_>, count| {
+        assert_eq!(rows.weights, bytes(count).collect::<Vec<i8>>());
+        assert_eq!(rows.multiplier, [1, 2, 3, 4, 5]);
+    };
+    rows(network.context_state, 5 * 3);
+    rows(network.context_kappa, 5 * 6);
+    rows(network.hidden_2, 5 * 5);
+    rows(network.hidden_3, 5 * 5);
+    assert_eq!(network.output, bytes(2 * 2 * 5).collect::<Vec<i8>>());
+    for bias in [network.context_bias, network.bias_2, network.bias_3] {
+        assert_eq!(bias, [10, 9, 8, 7, 6]);
+    }
+    assert_eq!((network.time_table.len(), network.action_input.len()), (7 * 5, 2 * 5));
+    assert_eq!(network.time_table[..3], [0x0201, 0x0403, 0x0402]);
+    assert_eq!(words(network.output_factor), [0, 1].map(|i| word(9, i)));
+    assert_eq!(words(network.output_bias), [2, 3].map(|i| word(9, i)));
+    assert_eq!((network.state_unit, network.kappa_unit, network.action_factor), (1.5, 2.5, 3.5));
+    assert_eq!((network.time_shift, network.action_shift), (1, 9));
+    let level = LevelScales { activate: [7, 8, 9], rescale: [10, 11], last_scale: 0.5 };
+    assert_eq!((network.level(0), network.level(7), network.level(8)), (None, Some(level), None));
+}
+
+#[test]
+fn an_integer_with_which_a_sum_might_overflow_is_named() {
+    let edited = |kind: SectionKind, at: usize, value: u32| {
+        let mut parts = Parts::integers(SHAPE);
+        parts.section(kind)[at] = value;
+        parts.fault()
+    };
+    // After the matrix come five multipliers, then five biases.
+    for (kind, multiplier) in [(SectionKind::Context, 4), (SectionKind::Hidden2, 7), (SectionKind::Hidden3, 7)] {
+        for value in [0, -1i32 as u32] {
+            assert_eq!(edited(kind, multiplier + 4, value), ImageError::OutOfRange(kind));
+        }
+        let last = Parts::integers(SHAPE).section(kind).len() - 1;
+        for value in [(1 << 28) + 1, -(1 << 28) - 1, i32::MIN] {
+            assert_eq!(edited(kind, last, value as u32), ImageError::OutOfRange(kind));
+        }
+    }
+    let scales = ImageError::OutOfRange(SectionKind::Scales);
+    for at in 0..3 {
+        for value in [0.0, -1.0, f32::NAN, f32::INFINITY] {
+            assert_eq!(edited(SectionKind::Scales, at, value.to_bits()), scales);
+        }
+    }
+    for (at, value) in [(3, 9), (4, 7), (4, 17), (5, 0), (9, 1 << 31), (10, 0), (46, f32::NAN.to_bits())] {
+        assert_eq!(edited(SectionKind::Scales, at, value), scales, "word {at} is {value}");
+    }
+    let last = Parts::integers(SHAPE).section(SectionKind::Output).len() - 1;
+    let bad = edited(SectionKind::Output, last, f32::NAN.to_bits());
+    assert_eq!(bad, ImageError::NotFinite(SectionKind::Output));
+}
+
+#[test]
+fn an_integer_section_of_the_wrong_length_is_named() {
+    for kind in &SectionKind::ALL[5..12] {
+        let mut longer = Parts::integers(SHAPE);
+        longer.section(*kind).push(1);
+        assert_eq!(longer.fault(), ImageError::Section(*kind));
+        let mut shorter = Parts::integers(SHAPE);
+        shorter.section(*kind).pop();
+        assert_eq!(shorter.fault(), ImageError::Section(*kind));
+    }
+}
+
+#[test]
+fn a_sum_of_more_terms_than_fit_is_refused_by_the_shape() {
+    let wide = Parts::integers(SHAPE);
+    for shape in
+        [Shape { state: 513, ..SHAPE }, Shape { hidden: 513, ..SHAPE }, Shape { kappa_embedding: 513, ..SHAPE }]
+    {
+        let mut parts = wide.clone();
+        parts.manifest.shape = shape;
+        *parts.section(SectionKind::StateNormaliser) = vec![0; 2 * usize::from(shape.state)];
+        *parts.section(SectionKind::Kappa3) = vec![0; 5 * usize::from(shape.kappa_embedding)];
+        assert_eq!(parts.fault_within(32768), ImageError::Shape);
     }
 }

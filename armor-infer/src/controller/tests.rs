@@ -1,6 +1,7 @@
 use super::*;
+use crate::Kernel;
 use crate::fixture::{Fixture, PAPER, Parts, SMALL, TRAINED_MAX};
-use armor_core::image::SectionKind;
+use armor_core::image::{Precision, SectionKind};
 use armor_core::schedule::Sampler as Kind;
 use armor_core::shape::Shape;
 use proptest::prelude::*;
@@ -226,4 +227,71 @@ fn the_bits_of_an_action_do_not_change() {
         bits.extend(controller.step(&[0.1; 7], 0.0).action.iter().map(|entry| entry.to_bits()));
     }
     assert_eq!(bits, [1_103_087_370, 1_103_070_781, 3_223_605_209, 3_228_845_123]);
+}
+
+const INTEGERS: [Precision; 2] = [Precision::Int16x8, Precision::Int8];
+
+/// An episode of an integer policy on a kernel: the bits of its actions.
+fn integer_episode(shape: Shape, precision: Precision, kernel: Kernel) -> Vec<u32> {
+    let mut parts = Fixture::integers(shape, precision, 1);
+    parts.set_bounds(-100.0, 100.0);
+    let fixture = parts.build();
+    let policy = Policy::load(&fixture.image()).unwrap().with_kernel(kernel);
+    let mut controller = Controller::<64, 8, 256>::new(policy, limit(5.0), 1).unwrap();
+    let state = |tick: usize| (0..shape.state.into()).map(move |i| (tick * 7 + i * 3) as f32 % 11.0 - 5.0);
+    let mut bits = Vec::new();
+    for tick in 0..4 {
+        let step = controller.step(&state(tick).collect::<Vec<f32>>(), 0.5);
+        assert_eq!(step.fault, None);
+        bits.extend(step.action.iter().take(shape.action.into()).map(|entry| entry.to_bits()));
+    }
+    bits
+}
+
+#[test]
+fn an_integer_policy_flies_the_same_bits_on_every_kernel() {
+    // Widths with and without a rest after whole vectors.
+    let odd = Shape { state: 61, action: 3, hidden: 139, kappa_hidden: 9, kappa_embedding: 41, steps: 7 };
+    for shape in [PAPER, odd, SMALL] {
+        for precision in INTEGERS {
+            let portable = integer_episode(shape, precision, Kernel::Portable);
+            assert!(portable.windows(2).all(|pair| pair[0] != pair[1]), "{portable:?} does not move");
+            for kernel in Kernel::available() {
+                assert_eq!(integer_episode(shape, precision, kernel), portable, "{}", kernel.name());
+            }
+        }
+    }
+}
+
+/// Recorded from this controller, on x86-64; neither the machine nor the
+/// compiler may change them.
+#[test]
+fn the_bits_of_an_integer_action_do_not_change() {
+    let first = |precision| integer_episode(PAPER, precision, Kernel::best())[..2].to_vec();
+    assert_eq!(INTEGERS.map(first), [[1_109_228_197, 3_234_605_074], [1_109_194_283, 3_234_741_589]]);
+}
+
+#[test]
+fn a_state_or_embedding_that_has_no_codes_is_a_fault() {
+    for precision in INTEGERS {
+        let infinite = fly(Fixture::integers(SMALL, precision, 1), |controller| controller.step(&[f32::MAX; 3], 0.0));
+        assert_eq!(infinite.fault, None, "the normaliser of the fixture halves");
+        let mut parts = Fixture::integers(SMALL, precision, 1);
+        parts.section(SectionKind::StateNormaliser)[3..].fill(4f32.to_bits());
+        let overflow = fly(parts.clone(), |controller| controller.step(&[f32::MAX; 3], 0.0));
+        assert_eq!((overflow.fault, overflow.action.as_slice()), (Some(Fault::ActionNotFinite), &[0.0; 4][..]));
+        parts.section(SectionKind::Kappa3).fill(f32::MAX.to_bits());
+        let overflow = fly(parts, |controller| controller.step(&STATE, 0.0));
+        assert_eq!(overflow.fault, Some(Fault::ActionNotFinite));
+    }
+}
+
+#[test]
+fn a_state_of_zeros_is_a_state() {
+    for precision in INTEGERS {
+        let mut parts = Fixture::integers(SMALL, precision, 1);
+        parts.section(SectionKind::StateNormaliser)[..3].fill(0);
+        let step = fly(parts, |controller| controller.step(&[0.0; 3], 0.0));
+        assert_eq!(step.fault, None);
+    }
 }

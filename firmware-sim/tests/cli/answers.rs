@@ -107,6 +107,7 @@ fn actions_are_timed() {
     let bench = Bench::new();
     let report = bench.json(&["bench", "policy.armor"]);
     let row = &report["rungs"][0];
+    assert_eq!((&row["precision"], &row["kernel"]), (&"f32".into(), &"portable".into()));
     assert_eq!((&row["steps"], &row["macs_per_action"]), (&5.into(), &(192 + 5 * 576).into()));
     assert!(row["actions_per_second"].as_f64().unwrap() > 0.0);
     fits_a_terminal(&bench.run(&["bench", "policy.armor"]));
