@@ -5,6 +5,7 @@
 //! | [`whole_line`] | what flies is what was trained, from the recording to the plant |
 //! | [`image_faults`] | a damaged or foreign image is named and never flown |
 //! | [`chip_faults`] | a damaged chip boots what was flashed to it, or nothing |
+//! | [`integers`] | a policy in integers is the one in single precision, to what 8 bits can say |
 //! | [`determinism`] | the same seed gives the same bits, on any number of threads and across any stop |
 //! | [`conformance`] | the method's invariants on recorded data, and where each of the others is tested |
 //!
@@ -16,4 +17,5 @@ mod conformance;
 mod determinism;
 mod fixture;
 mod image_faults;
+mod integers;
 mod whole_line;
