@@ -98,3 +98,27 @@ pub(super) fn agreement(float: Policy<'_>, integer: Policy<'_>, data: &Dataset) 
     }
     Ok(Agreement::new(&differences, AGREEMENT_SAMPLES))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn flown(rung: u8, reward_normalized: f32, cost_normalized: f32) -> Quality {
+        Quality { rung, limit: Cost::from_raw(5 << 16), episodes: 20, reward_normalized, cost_normalized }
+    }
+
+    #[test]
+    fn a_rung_whose_reward_moves_or_whose_cost_rises_is_found() {
+        let float = [flown(0, 0.5, 0.5), flown(1, 0.25, 0.5)];
+        let beyond = |reward, cost| {
+            Drift::new(&float, &[float[0], flown(1, reward, cost)]).beyond_bounds().map(|rung| rung.rung)
+        };
+        assert_eq!(beyond(0.25, 0.5), None);
+        for (reward, cost) in [(0.26, 0.5), (0.24, 0.5), (0.25, 0.59), (0.25, 0.0)] {
+            assert_eq!(beyond(reward, cost), None, "{reward}, {cost}");
+        }
+        for (reward, cost) in [(0.28, 0.5), (0.22, 0.5), (0.25, 0.61), (f32::NAN, 0.5), (0.25, f32::NAN)] {
+            assert_eq!(beyond(reward, cost), Some(1), "{reward}, {cost}");
+        }
+    }
+}

@@ -64,3 +64,53 @@ fn code(weight: f64, scale: f64) -> i8 {
     // 0 / 0 is no number, and as an integer 0.
     (weight / scale).round().clamp(-HIGHEST, HIGHEST) as i8
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use armor_core::noise::Noise;
+
+    const OUTPUTS: usize = 5;
+    const INPUTS: usize = 40;
+
+    /// Rows of very different size, one of them zero, stored input by input.
+    fn weights() -> Vec<f32> {
+        let mut weights = vec![0.0; INPUTS * OUTPUTS];
+        Noise::new(1).fill_normal(0, 0, &mut weights);
+        let sizes = [1.0, 1e-3, 0.0, 30.0, 0.1];
+        weights.iter().enumerate().map(|(i, weight)| weight * sizes[i % OUTPUTS]).collect()
+    }
+
+    fn realised(rows: &QuantizedRows, output: usize, input: usize) -> f64 {
+        let scale = f64::from(rows.multiplier[output]) / f64::from(1u32 << 31) * rows.scale;
+        scale * f64::from(rows.codes[output * INPUTS + input])
+    }
+
+    /// A scale of at least 20/32 of the largest weight over 127 clips what lies beyond.
+    #[test]
+    fn every_row_keeps_its_weights_to_a_small_part_of_its_own_size() {
+        let weights = weights();
+        let rows = QuantizedRows::new(&weights, OUTPUTS);
+        for output in 0..OUTPUTS {
+            let row = |input: usize| f64::from(weights[input * OUTPUTS + output]);
+            let size = (0..INPUTS).map(|input| row(input).powi(2)).sum::<f64>().sqrt();
+            let error =
+                (0..INPUTS).map(|input| (row(input) - realised(&rows, output, input)).powi(2)).sum::<f64>().sqrt();
+            assert!(error <= 0.01 * size, "row {output}: {error} of {size}");
+            let sum = (0..INPUTS).map(|input| realised(&rows, output, input)).sum::<f64>();
+            assert!((rows.sums[output] - sum).abs() <= 1e-12 * size.max(1.0));
+        }
+    }
+
+    #[test]
+    fn the_shortfall_is_what_the_mean_input_misses() {
+        let weights = weights();
+        let rows = QuantizedRows::new(&weights, OUTPUTS);
+        let means: Vec<f64> = (0..INPUTS).map(|input| input as f64 / 10.0 - 1.0).collect();
+        for (output, shortfall) in rows.shortfall(&weights, &means).into_iter().enumerate() {
+            let exact: f64 = (0..INPUTS).map(|i| means[i] * f64::from(weights[i * OUTPUTS + output])).sum();
+            let kept: f64 = (0..INPUTS).map(|i| means[i] * realised(&rows, output, i)).sum();
+            assert!((kept + shortfall - exact).abs() < 1e-9, "row {output}");
+        }
+    }
+}

@@ -130,6 +130,31 @@ fn every_kind_of_policy_flies() {
 }
 
 #[test]
+fn a_policy_is_exported_in_integers_with_what_they_change() {
+    let bench = Bench::new();
+    bench.success(&ball_run("run", 5));
+    for precision in ["int16x8", "int8"] {
+        let image = format!("{precision}.armor");
+        // Five training steps make no policy to be kept, so whatever it does is accepted.
+        let export = ["export", "run", "--precision", precision, "--accept-drift", "-o", &image];
+        let report = bench.json(&export);
+        assert_eq!((&report["precision"], &report["agreement_samples"]), (&precision.into(), &1024.into()));
+        assert!(report["agreement_rms"].as_f64().unwrap() > 0.0, "{report}");
+        let drift = report["drift"].as_array().unwrap();
+        assert_eq!(drift[0]["rung"], 0);
+        assert!(drift.iter().all(|rung| rung["float_reward_normalized"].is_number()), "{report}");
+        let bytes = firmware_sim::memory::AlignedBytes::read(&bench.path(&image)).unwrap();
+        assert_eq!(firmware_sim::verify::verify(bytes.as_slice(), 0).failures(), 0, "{precision}");
+        fits_a_terminal(&bench.success(&export));
+    }
+
+    // A task without a native plant is compared on its recorded states alone.
+    bench.success(&toy("toy", 2, &[]));
+    let report = bench.json(&["export", "toy", "--precision", "int8", "-o", "toy.armor"]);
+    assert_eq!(report["drift"], serde_json::json!([]));
+}
+
+#[test]
 fn a_task_of_the_users_own_is_trained_and_exported_in_any_size() {
     let bench = Bench::new();
     fits_a_terminal(&bench.success(&toy("run", 2, &[])));
