@@ -66,6 +66,5 @@ fn recording() -> Recording {
         costs: normals(4, ROWS).into_iter().map(|value| if value > 1.0 { 1.0 } else { 0.0 }).collect(),
         terminals: vec![false; ROWS],
         timeouts: (0..ROWS).map(|row| (row + 1) % EPISODE == 0).collect(),
-        ..Recording::default()
     }
 }
