@@ -4,6 +4,7 @@ mod data;
 mod evaluate;
 mod export;
 mod fit;
+mod flyer;
 mod options;
 mod progress;
 mod quickstart;

@@ -11,6 +11,7 @@ use armor_infer::{LoadError, Policy};
 use serde::Serialize;
 
 use super::output::{CommandResult, Output};
+use super::round_trip::{self, RoundTrips};
 use super::sampler_name;
 use crate::host::HostController;
 use crate::image_file::ImageFile;
@@ -26,6 +27,10 @@ const WARM_UP: u64 = 50;
 pub(super) struct Bench {
     /// The policy image.
     image: PathBuf,
+    /// Measure the round trip of an action over the link as well, by TCP and by
+    /// standard streams, on the longest rung and on the shortest.
+    #[arg(long)]
+    link: bool,
 }
 
 #[derive(Serialize)]
@@ -33,6 +38,8 @@ struct Report {
     task: String,
     image_bytes: usize,
     rungs: Vec<Row>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    link: Vec<RoundTrips>,
 }
 
 /// What one rung takes.
@@ -72,7 +79,14 @@ impl Bench {
                 latency,
             });
         }
-        output.report(&Report { task: manifest.task.into(), image_bytes: image.bytes().len(), rungs })
+        let mut link = Vec::new();
+        if self.link {
+            let (longest, shortest) = (manifest.rungs.first(), manifest.rungs.last());
+            for rung in longest.into_iter().chain(shortest) {
+                link.extend(round_trip::time(&self.image, rung.steps)?);
+            }
+        }
+        output.report(&Report { task: manifest.task.into(), image_bytes: image.bytes().len(), rungs, link })
     }
 }
 
@@ -111,6 +125,13 @@ impl fmt::Display for Report {
                 "{:>4}  {chain:<10}{:>12}{latency_us_p50:>12.1}{latency_us_p99:>12.1}{:>12.0}",
                 row.rung, row.macs_per_action, row.actions_per_second
             )?;
+        }
+        if !self.link.is_empty() {
+            writeln!(f, "\nline   steps    median us      p99 us   from a state to its action, over the link")?;
+        }
+        for RoundTrips { line, steps, quantiles, .. } in &self.link {
+            let Quantiles { latency_us_p50, latency_us_p99, .. } = quantiles;
+            writeln!(f, "{line:<7}{steps:>5}{latency_us_p50:>13.1}{latency_us_p99:>12.1}")?;
         }
         let Some(longest) = self.rungs.first() else { return Ok(()) };
         write!(f, "\nhost latency of an action on rung 0\n{}", longest.latency.to_string().trim_end())
