@@ -14,7 +14,7 @@ use serde::Deserialize;
 
 use super::environment::{Environment, last_line};
 use super::error::SimulatorError;
-use crate::flight::FlightPlan;
+use crate::flight::{FlightError, FlightPlan};
 use crate::link::{HostEndpoint, Served, patient_socket, serve};
 
 /// What a simulator has for its next request; a reset takes at most seconds.
@@ -66,8 +66,7 @@ pub(super) fn fly<'a>(
 
     let served = match simulator.connection(&listener) {
         Ok(Some(socket)) => {
-            let mut endpoint =
-                HostEndpoint::new(image, plan.max_steps).map_err(|error| crate::flight::FlightError::Load(error))?;
+            let mut endpoint = HostEndpoint::new(image, plan.max_steps).map_err(FlightError::Load)?;
             patient_socket(socket, PATIENCE)
                 .map_err(|error| error.to_string())
                 .and_then(|mut socket| serve(&mut socket, &mut endpoint, PATIENCE, answered).map_err(|e| e.to_string()))
