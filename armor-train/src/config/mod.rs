@@ -12,8 +12,10 @@ use armor_core::schedule::{Noising, Sampler};
 use serde::{Deserialize, Serialize};
 
 use crate::actor::{CloningNorm, Family, Guidance, PolicyGradient, ReverseVariance};
+use crate::critic::bootstrap::Bootstrap;
 use crate::critic::{CostHeads, CostOutput, Trunk, TwinLoss};
 use crate::dual::DualClip;
+use crate::extraction::Extraction;
 use crate::pcgrad::{Order, Pooling};
 use crate::reweight::reference::Reference;
 use crate::threshold::Threshold;
@@ -122,6 +124,27 @@ pub struct Config {
     pub target_sampler: Sampler,
     /// Steps of that sampler, at most `diffusion_steps`.
     pub target_steps: usize,
+
+    /// What the critics' targets bootstrap from (Eq. 3).
+    pub bootstrap: Bootstrap,
+    /// Whether the critics see kappa; they do in the paper. Recorded data meet
+    /// every budget by construction, so a critic that sees kappa finds nearly all of it feasible.
+    pub critic_sees_kappa: bool,
+    /// Expectile of the state values of reward.
+    pub reward_expectile: f64,
+    /// Expectile of the state values of cost; below 0.5 leans towards the cheapest action.
+    pub cost_expectile: f64,
+    /// Training steps of the critics alone, which are frozen then while the
+    /// actor learns for the rest; 0, both at once, in the paper.
+    pub critic_steps: u64,
+    /// How the actor takes up what the critics know (Eqs. 13 to 15).
+    pub extraction: Extraction,
+    /// Inverse temperature alpha of advantage weights.
+    pub advantage_temperature: f64,
+    /// Price lambda of cost in advantage weights, in units of scaled advantages.
+    pub advantage_lambda: f64,
+    /// Largest logarithm of an advantage weight.
+    pub advantage_cap: f64,
 
     /// Share of samples whose kappa is relabelled with a larger budget; 0 in the
     /// paper. Recorded kappa always ends at 0, so a clone learns to spend it all.
