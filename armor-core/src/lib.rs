@@ -27,6 +27,7 @@
 extern crate std;
 
 pub mod budget;
+pub mod budget_map;
 pub mod image;
 pub mod mish;
 pub mod noise;

@@ -50,7 +50,7 @@ impl<const STATE: usize, const HIDDEN: usize> Denoiser<STATE, HIDDEN> {
         let [layer_1, layer_2, layer_3] = &numbers.kappa;
         let first = front(&mut self.odd, k);
         let second = front(&mut self.even, k);
-        affine(layer_1, &[policy.kappa.scale * kappa.to_f32()], first);
+        affine(layer_1, &[policy.kappa.scale * policy.condition(kappa)], first);
         activate(first);
         affine(layer_2, first, second);
         activate(second);

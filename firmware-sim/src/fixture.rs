@@ -58,6 +58,7 @@ impl Parts {
             SectionKind::Output => layer(kind, h, h * a + a),
             SectionKind::Chain => chain.clone(),
             SectionKind::Golden => vec![0; 4],
+            SectionKind::BudgetMap => Vec::new(),
         });
         let provenance = Provenance {
             version: "0.0.0",

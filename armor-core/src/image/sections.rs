@@ -3,6 +3,7 @@
 use super::golden::GoldenTrace;
 use super::manifest::{Manifest, SectionKind};
 use super::{ALIGNMENT, ImageError};
+use crate::budget_map::BudgetMap;
 use crate::schedule::ChainStep;
 
 #[cfg(target_endian = "big")]
@@ -48,6 +49,8 @@ pub struct Sections<'a> {
     pub output: Dense<'a>,
     /// The golden trace.
     pub golden: GoldenTrace<'a>,
+    /// What the policy is conditioned on at a budget; none where that is the budget itself.
+    pub budget_map: Option<BudgetMap<'a>>,
     chain: &'a [[u32; ChainStep::WORDS]],
 }
 
@@ -92,6 +95,7 @@ impl<'a> Sections<'a> {
         let chain_steps = manifest.rungs.iter().map(|rung| usize::from(rung.steps)).sum::<usize>();
         let chain = reader.words(SectionKind::Chain, Some(chain_steps * ChainStep::WORDS))?;
         let golden = GoldenTrace::read(reader.words(SectionKind::Golden, None)?, s, a)?;
+        let budget_map = reader.budget_map()?;
         reader.finish()?;
 
         let (chain, _) = chain.as_chunks();
@@ -110,6 +114,7 @@ impl<'a> Sections<'a> {
             hidden_3,
             output,
             golden,
+            budget_map,
             chain,
         };
         sections.check_bounds()?;
@@ -196,6 +201,17 @@ impl<'a> Reader<'_, 'a> {
     fn dense(&mut self, kind: SectionKind, inputs: usize, outputs: usize) -> Result<Dense<'a>, ImageError> {
         let (weights, bias) = self.pair(kind, inputs * outputs, outputs)?;
         Ok(Dense { weights, bias })
+    }
+
+    /// The knots of the budget map, if the table names it.
+    fn budget_map(&mut self) -> Result<Option<BudgetMap<'a>>, ImageError> {
+        if self.manifest.sections.get(self.next).is_none_or(|section| section.kind != SectionKind::BudgetMap) {
+            return Ok(None);
+        }
+        match self.words(SectionKind::BudgetMap, None)?.as_chunks() {
+            (knots, []) => BudgetMap::new(knots).map(Some).ok_or(ImageError::BudgetMap),
+            _ => Err(ImageError::Section(SectionKind::BudgetMap)),
+        }
     }
 
     /// The last section ends where the image ends, and no section follows it.

@@ -46,6 +46,7 @@ pub(super) fn sections(
             rungs.iter().flat_map(chain).flat_map(|step| step.to_f32().to_words()).collect()
         }
         SectionKind::Golden => golden.to_vec(),
+        SectionKind::BudgetMap => Vec::new(),
     })
 }
 

@@ -139,7 +139,8 @@ pub(crate) fn sealed_anew(bytes: &AlignedBytes, change: impl FnOnce(&mut Manifes
             bytes.as_chunks().0.iter().map(|word| u32::from_le_bytes(*word)).collect()
         })
         .collect();
-    let contents: [&[u32]; SECTION_COUNT] = std::array::from_fn(|index| &sections[index][..]);
+    let contents: [&[u32]; SECTION_COUNT] =
+        std::array::from_fn(|index| sections.get(index).map_or(&[][..], Vec::as_slice));
     let mut manifest = image.manifest().clone();
     change(&mut manifest);
     let mut out = AlignedBytes::filled(0, bytes.as_slice().len() + 16);
