@@ -21,7 +21,7 @@ pub struct Batch<T: Scalar> {
     pub kappa: Vec<T>,
     /// Remaining budget after the step `[B]`.
     pub next_kappa: Vec<T>,
-    /// What the actor is conditioned on where it is cloned alone `[B]`; kappa, or a place in the range of lambda.
+    /// What the actor is conditioned on where it is cloned alone `[B]`; kappa, or a leniency.
     pub condition: Vec<T>,
     /// What `Q_cL` is held against, in units of scaled cost `[B]`; kappa in the paper.
     pub threshold: Vec<T>,

@@ -1,6 +1,6 @@
 //! The algorithm: one training step of ARMOR, top to bottom.
 
-use armor_core::noise::{Noise, below};
+use armor_core::noise::{Noise, below, uniform};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -10,7 +10,9 @@ use crate::critic::Task;
 use crate::data::Dataset;
 use crate::extraction::Extraction;
 use crate::extraction::advantage::{Advantages, Judges};
-use crate::extraction::weight::{self, AdvantageWeight, BatchWeights};
+use crate::extraction::cloning::Cloning;
+use crate::extraction::condition::Condition;
+use crate::extraction::weight::{self, BatchWeights};
 use crate::model::{Model, Optimisers, Parameters};
 use crate::nn::{Scalar, dot, soft_update};
 use crate::normaliser::Normaliser;
@@ -37,7 +39,7 @@ pub struct Learner<'d, T: Scalar> {
     noise: Noise,
     reweighting: Reweighting,
     /// By the frozen critics; none before they are, or where the actor is guided.
-    advantages: Option<Advantages>,
+    cloning: Option<Cloning>,
     state: LearnerState<T>,
     workers: Vec<Worker<T>>,
 }
@@ -114,7 +116,7 @@ impl<'d, T: Scalar> Learner<'d, T> {
             model,
             noise: Noise::new(config.seed),
             reweighting,
-            advantages: None,
+            cloning: None,
             state,
             workers,
             config,
@@ -127,8 +129,8 @@ impl<'d, T: Scalar> Learner<'d, T> {
         if self.reweighting.is_due(self.state.step) {
             self.reweight();
         }
-        if phase == Phase::Actor && self.advantages.is_none() {
-            self.advantages = self.judge_data();
+        if phase == Phase::Actor && self.cloning.is_none() {
+            self.cloning = self.judge_data();
         }
         self.gather();
 
@@ -159,7 +161,7 @@ impl<'d, T: Scalar> Learner<'d, T> {
             metrics.values = Some(VALUES.map(|task| spread(workers.iter().flat_map(|w| w.recorded_values(task)))));
         }
         if phase.trains_actor() {
-            let gradients = if self.advantages.is_some() {
+            let gradients = if self.cloning.is_some() {
                 let mut shares: Vec<&mut [T]> = workers.iter_mut().map(|worker| &mut worker.batch.weight[..]).collect();
                 metrics.batch_weights = Some(weight::normalise(&mut shares));
                 let (cloning, gradient) = update_imitation(model, parameters, optimisers, workers);
@@ -179,15 +181,16 @@ impl<'d, T: Scalar> Learner<'d, T> {
         metrics
     }
 
-    /// The advantages of all transitions, where the actor clones by them.
-    fn judge_data(&self) -> Option<Advantages> {
+    /// Judges all transitions, where the actor clones by their advantages.
+    pub(crate) fn judge_data(&self) -> Option<Cloning> {
         let value = self.model.state_value.as_ref().filter(|_| self.config.extraction == Extraction::Weighted)?;
         let parameters = &self.state.parameters;
         let judges = Judges {
             critic: (&self.model.critic, &parameters.target[..]),
             value: (value, &parameters.state_value[..]),
         };
-        Some(Advantages::new(&Source::new(&self.config, self.data, &self.normaliser), judges, self.data.len()))
+        let source = Source::new(&self.config, self.data, &self.normaliser);
+        Some(Cloning::new(&self.config, Advantages::new(&source, judges, self.data.len())))
     }
 
     /// Draws a batch of uniform transitions with replacement, and the noise of behaviour cloning.
@@ -197,8 +200,7 @@ impl<'d, T: Scalar> Learner<'d, T> {
         let (step, noise, batch) = (self.state.step, self.noise, self.config.batch as u64);
         let levels = self.config.diffusion_steps as u32;
         let source = Source::new(&self.config, self.data, &self.normaliser);
-        let (config, advantages) = (&self.config, self.advantages.as_ref());
-        let advantage_weight = AdvantageWeight { alpha: config.advantage_temperature, cap: config.advantage_cap };
+        let (cloning, condition) = (self.cloning.as_ref(), self.config.condition);
         let (weights, rows) = (&self.reweighting.weights().combined, self.data.len() as u32);
         self.workers.par_iter_mut().for_each(|worker| {
             for sample in 0..worker.batch.samples() {
@@ -207,13 +209,16 @@ impl<'d, T: Scalar> Learner<'d, T> {
                 let row = below(word(stream::ROWS), rows) as usize;
                 let extra = source.larger_budget(row, word(stream::BUDGET), word(stream::RELABEL));
                 source.fill(&mut worker.batch, sample, row, extra);
-                worker.batch.weight[sample] = match advantages {
+                let leniency = uniform(word(stream::LENIENCY));
+                worker.batch.weight[sample] = match cloning {
                     None => T::of_f32(weights[row]),
-                    Some(advantages) => {
-                        let log = advantage_weight.log(advantages.scaled[row], config.advantage_lambda);
-                        T::of(f64::from(weights[row]).ln() + log)
-                    }
+                    Some(cloning) => T::of(f64::from(weights[row]).ln() + cloning.log_weight(row, f64::from(leniency))),
                 };
+                match condition {
+                    Condition::Kappa => {}
+                    Condition::Lambda => worker.batch.condition[sample] = T::of_f32(leniency),
+                    Condition::None => worker.batch.condition[sample] = T::zero(),
+                }
                 worker.levels[sample] = 1 + below(word(stream::LEVELS), levels) as usize;
                 let mut column = worker.cloning.column_mut(sample);
                 stream::fill_normal(noise, stream::CLONING, step * batch + place as u64, column.as_mut_slice());
@@ -264,8 +269,8 @@ impl<'d, T: Scalar> Learner<'d, T> {
     }
 
     /// The advantages that the actor clones by, once the critics are frozen.
-    pub const fn advantages(&self) -> Option<&Advantages> {
-        self.advantages.as_ref()
+    pub fn advantages(&self) -> Option<&Advantages> {
+        self.cloning.as_ref().map(Cloning::advantages)
     }
 
     /// Refreshes of the weights so far.

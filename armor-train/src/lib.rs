@@ -15,6 +15,7 @@
 
 pub mod actor;
 pub mod batch;
+pub mod calibrate;
 pub mod cli;
 pub mod config;
 pub mod critic;

@@ -92,7 +92,7 @@ impl Model {
             variance: config.reverse_variance,
             temperature: config.temperature,
         };
-        let denoiser = Denoiser::new(widths, config.kappa_scale);
+        let denoiser = Denoiser::new(widths, config.condition_scale());
         // A critic that shall not tell budgets apart sees 0.
         let critic_scale = if config.critic_sees_kappa { config.kappa_scale } else { 0.0 };
         let expectiles = [config.reward_expectile, config.cost_expectile, config.cost_expectile];

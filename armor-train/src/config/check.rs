@@ -6,6 +6,7 @@ use super::{Config, ConfigError};
 use crate::actor::{Family, PolicyGradient};
 use crate::critic::bootstrap::Bootstrap;
 use crate::extraction::Extraction;
+use crate::extraction::condition::Condition;
 
 impl Config {
     /// Whether every option lies in its range.
@@ -33,6 +34,8 @@ impl Config {
             ("actor_rate", self.actor_rate),
             ("critic_rate", self.critic_rate),
             ("dual_rate", self.dual_rate),
+            ("lambda_min", self.lambda_min),
+            ("lambda_max", self.lambda_max),
         ];
         for (key, value) in positive {
             require(key, value.is_finite() && value > 0.0, "a positive number")?;
@@ -72,6 +75,9 @@ impl Config {
         let (in_sample, weighted) = (self.bootstrap == Bootstrap::InSample, self.extraction == Extraction::Weighted);
         require("critic_steps", in_sample || self.critic_steps == 0, "0 unless bootstrap is in_sample")?;
         require("critic_steps", self.critic_steps < self.steps, "below steps")?;
+        let by_kappa = self.condition == Condition::Kappa;
+        require("condition", weighted || by_kappa, "kappa unless extraction is weighted")?;
+        require("lambda_max", self.lambda_min <= self.lambda_max, "at least lambda_min")?;
         require("critic_steps", !weighted || self.critic_steps >= 1, "at least 1 where extraction is weighted")?;
         require("actor_average", (0.0..1.0).contains(&self.actor_average), "from 0 to below 1")?;
         require("feasible_mass", (0.0..1.0).contains(&self.feasible_mass), "from 0 to below 1")?;
@@ -131,6 +137,8 @@ mod tests {
         assert_eq!(faults(&sound[2..]).as_deref(), Some(unless));
         let weighted = "option `critic_steps` must be at least 1 where extraction is weighted";
         assert_eq!(faults(&sound[..2]).as_deref(), Some(weighted));
+        let only = "option `condition` must be kappa unless extraction is weighted";
+        assert_eq!(faults(&["condition=lambda"]).as_deref(), Some(only));
         let below = "option `critic_steps` must be below steps";
         assert_eq!(faults(&["bootstrap=in_sample", "critic_steps=9000"]).as_deref(), Some(below));
     }

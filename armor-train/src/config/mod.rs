@@ -16,6 +16,7 @@ use crate::critic::bootstrap::Bootstrap;
 use crate::critic::{CostHeads, CostOutput, Trunk, TwinLoss};
 use crate::dual::DualClip;
 use crate::extraction::Extraction;
+use crate::extraction::condition::{Condition, LambdaRange};
 use crate::pcgrad::{Order, Pooling};
 use crate::reweight::reference::Reference;
 use crate::threshold::Threshold;
@@ -145,6 +146,12 @@ pub struct Config {
     pub advantage_lambda: f64,
     /// Largest logarithm of an advantage weight.
     pub advantage_cap: f64,
+    /// What the actor is conditioned on; kappa in the paper.
+    pub condition: Condition,
+    /// Smallest price of cost that an actor conditioned on it is trained for.
+    pub lambda_min: f64,
+    /// Largest such price.
+    pub lambda_max: f64,
 
     /// Share of samples whose kappa is relabelled with a larger budget; 0 in the
     /// paper. Recorded kappa always ends at 0, so a clone learns to spend it all.
@@ -200,6 +207,22 @@ pub struct Config {
     pub weight_min: f64,
     /// Largest weight, `w_max` (Eqs. 9 and 10, Table 2).
     pub weight_max: f64,
+}
+
+impl Config {
+    /// The factor on what the actor is conditioned on, where that enters its embedding, in units of scaled
+    /// cost for kappa; a leniency lies within 0 and 1 already.
+    pub const fn condition_scale(&self) -> f64 {
+        match self.condition {
+            Condition::Kappa => self.kappa_scale,
+            Condition::Lambda | Condition::None => 1.0,
+        }
+    }
+
+    /// The prices of cost that an actor conditioned on them is trained for.
+    pub const fn lambda_range(&self) -> LambdaRange {
+        LambdaRange { min: self.lambda_min, max: self.lambda_max }
+    }
 }
 
 /// Why a configuration cannot be used.

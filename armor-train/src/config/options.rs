@@ -185,6 +185,12 @@ pub const OPTIONS: [(&str, &[Entry]); 6] = [
             ("advantage_temperature", "inverse temperature alpha of those weights"),
             ("advantage_lambda", "price lambda of cost in those weights"),
             ("advantage_cap", "largest logarithm of those weights"),
+            (
+                "condition",
+                "what the actor is conditioned on, beside the state: `kappa` (the paper), `lambda`, the price of cost in its weights, drawn log-uniformly for each sample, to which the command calibrate maps the remaining budget, or `none`; the last two need weighted extraction",
+            ),
+            ("lambda_min", "smallest price that is drawn"),
+            ("lambda_max", "largest price that is drawn"),
         ],
     ),
     (

@@ -9,6 +9,7 @@ use crate::critic::bootstrap::Bootstrap;
 use crate::critic::{CostHeads, CostOutput, Trunk, TwinLoss};
 use crate::dual::DualClip;
 use crate::extraction::Extraction;
+use crate::extraction::condition::Condition;
 use crate::pcgrad::{Order, Pooling};
 use crate::reweight::reference::Reference;
 use crate::threshold::Threshold;
@@ -92,6 +93,9 @@ impl Preset {
             advantage_temperature: 2.0,
             advantage_lambda: 2.0,
             advantage_cap: 3.0,
+            condition: Condition::Kappa,
+            lambda_min: 0.25,
+            lambda_max: 8.0,
             relabel_share: 0.0,
             threshold: Threshold::Kappa,
             dual_slack: 0.0,

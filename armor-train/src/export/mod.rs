@@ -39,6 +39,11 @@ pub enum ExportError {
         /// The largest difference.
         found: f32,
     },
+    /// The actor is conditioned on the price of cost, and nothing says which price a budget asks for.
+    #[error(
+        "the policy is conditioned on the price of cost and has no map from the budget to it yet; run `armor-train calibrate` on the run's folder first"
+    )]
+    NotCalibrated,
     /// The data has no trajectory.
     #[error("the data has no trajectory to take a golden trace from")]
     NoTrajectory,

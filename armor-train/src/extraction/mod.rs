@@ -1,6 +1,8 @@
 //! How the actor takes up what the critics know.
 
 pub mod advantage;
+pub mod cloning;
+pub mod condition;
 pub mod weight;
 
 use serde::{Deserialize, Serialize};

@@ -121,7 +121,7 @@ fn of_another_size() -> [AlignedBytes; 2] {
     config.task = "three-legs".to_owned();
     let run = Run::new();
     run.fit(&config, &data, None);
-    let bytes = export(&run.checkpoint(), &data).unwrap().bytes;
+    let bytes = export(&run.checkpoint(), &data, None).unwrap().bytes;
     let renamed = sealed_anew(&bytes, |manifest| manifest.task = "ball-run");
     [bytes, renamed]
 }
