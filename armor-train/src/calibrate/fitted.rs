@@ -104,7 +104,7 @@ impl Evaluation<'_> {
             batch: self.source.room(samples),
             leniency: vec![0.0; samples],
             context: actor.denoiser.context(samples),
-            chain: Chain::new(&actor.denoiser, steps, samples, false),
+            chain: Chain::new(&actor.denoiser, steps, samples, 0),
             input: DMatrix::zeros(inputs, samples),
             next_input: DMatrix::zeros(inputs, samples),
             tape: fit.network.tape(samples),

@@ -116,7 +116,7 @@ impl Study {
         if let Outcome::Stopped(step) = train(label, &run.config, data, &folder, resume, output)? {
             return Err(format!("stopped and saved {label} at step {step}; the same command goes on").into());
         }
-        let exported = export(&Checkpoint::read(&folder)?, data)?;
+        let exported = export(&Checkpoint::read(&folder)?, data, None)?;
         let score = Score {
             of,
             flights: fly_all((study, flyer), run, exported.bytes.as_slice(), output)?,
