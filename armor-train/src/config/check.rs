@@ -74,7 +74,7 @@ impl Config {
         }
         let (in_sample, weighted) = (self.bootstrap == Bootstrap::InSample, self.extraction == Extraction::Weighted);
         require("critic_steps", in_sample || self.critic_steps == 0, "0 unless bootstrap is in_sample")?;
-        require("critic_steps", self.critic_steps < self.steps, "below steps")?;
+        require("critic_steps", self.critic_steps == 0 || self.critic_steps < self.steps, "below steps")?;
         let by_kappa = self.condition == Condition::Kappa;
         require("condition", weighted || by_kappa, "kappa unless extraction is weighted")?;
         require("lambda_max", self.lambda_min <= self.lambda_max, "at least lambda_min")?;
