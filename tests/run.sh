@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # Runs every test of the workspace: units, documentation, integration, the
-# command lines, and the bare-metal builds. Installs a compiler if there is
-# none (Debian, as root). Prints one line for each part, and ends at the first
-# that fails.
+# command lines, the simulators over the link, and the bare-metal builds.
+# Installs a compiler if there is none (Debian, as root). Prints one line for
+# each part, and ends at the first that fails.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -26,4 +26,5 @@ if ! { command -v cargo && command -v cc; } >/dev/null; then
 fi
 
 part "workspace" cargo test --workspace --locked --no-fail-fast
+part "link" tests/link.sh
 part "bare metal" tests/bare-metal.sh

@@ -28,6 +28,7 @@
 extern crate std;
 
 pub mod budget;
+pub mod budget_map;
 pub mod fixed;
 pub mod image;
 pub mod mish;

@@ -149,6 +149,11 @@ impl<'a> Policy<'a> {
         chain.iter().map(|words| ChainStep::from_words(*words))
     }
 
+    /// What the embedding is given at a remaining budget: the budget, or what the image maps it to.
+    pub(crate) fn condition(&self, kappa: Cost) -> f32 {
+        self.sections.budget_map.map_or(kappa.to_f32(), |map| map.condition(kappa))
+    }
+
     /// Whether buffers of these capacities hold every vector of the network.
     pub(crate) fn check_capacities(&self, state: usize, action: usize, hidden: usize) -> Result<(), LoadError> {
         let shape = &self.shape;

@@ -36,7 +36,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             Some(("steps", count)) => {
                 let mut losses = [0.0; 3];
                 for _ in 0..count.parse()? {
-                    losses = learner.step().critic.losses;
+                    losses = learner.step().critic.map_or([0.0; 3], |critic| critic.losses);
                 }
                 println!("{losses:?}");
             }

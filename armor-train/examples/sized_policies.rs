@@ -30,7 +30,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     (config.steps, config.batch) = (20, 64);
     let run = folder.join("run");
     fit(&config, &data, &run, false, &mut Unwatched)?;
-    let exported = export(&Checkpoint::read(&run)?, &data)?;
+    let exported = export(&Checkpoint::read(&run)?, &data, None)?;
     std::fs::write(folder.join("f32.armor"), exported.bytes.as_slice())?;
     let float = PolicyImage::new_checked(exported.bytes.as_slice())?;
     for (precision, name) in [(Precision::Int16x8, "int16x8.armor"), (Precision::Int8, "int8.armor")] {

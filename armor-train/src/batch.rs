@@ -21,6 +21,8 @@ pub struct Batch<T: Scalar> {
     pub kappa: Vec<T>,
     /// Remaining budget after the step `[B]`.
     pub next_kappa: Vec<T>,
+    /// What the actor is conditioned on where it is cloned alone `[B]`; kappa, or a leniency.
+    pub condition: Vec<T>,
     /// What `Q_cL` is held against, in units of scaled cost `[B]`; kappa in the paper.
     pub threshold: Vec<T>,
     /// 1 where the episode goes on after the step, 0 where it ends `[B]`.
@@ -41,6 +43,7 @@ impl<T: Scalar> Batch<T> {
             cost: row(),
             kappa: row(),
             next_kappa: row(),
+            condition: row(),
             threshold: row(),
             alive: row(),
             weight: row(),

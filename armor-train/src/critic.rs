@@ -10,6 +10,10 @@
 
 mod options;
 
+pub mod bootstrap;
+mod expectile;
+pub mod value;
+
 use nalgebra::DMatrix;
 
 use crate::nn::{Activation, Mlp, Scalar, Tape};

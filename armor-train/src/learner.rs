@@ -1,6 +1,6 @@
 //! The algorithm: one training step of ARMOR, top to bottom.
 
-use armor_core::noise::{Noise, below};
+use armor_core::noise::{Noise, below, uniform};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -8,19 +8,27 @@ use crate::actor::ActorLoss;
 use crate::config::Config;
 use crate::critic::Task;
 use crate::data::Dataset;
+use crate::extraction::Extraction;
+use crate::extraction::advantage::{Advantages, Judges};
+use crate::extraction::cloning::Cloning;
+use crate::extraction::condition::Condition;
+use crate::extraction::weight::{self, BatchWeights};
 use crate::model::{Model, Optimisers, Parameters};
 use crate::nn::{Scalar, dot, soft_update};
 use crate::normaliser::Normaliser;
 use crate::pcgrad::{self, Order};
+use crate::phase::Phase;
 use crate::reweight::{Reweighting, Weights};
 use crate::source::Source;
 use crate::stream;
-use crate::update::{CriticMetrics, Worker, update_actor, update_critic, update_target};
+use crate::update::{CriticMetrics, Worker, update_actor, update_critic, update_imitation, update_target};
 
 /// Samples of a worker's share. A constant, so that the shares, and with them
 /// the order of all sums, do not depend on the machine; a multiple of the
 /// columns of a product's tile.
 pub(crate) const SHARE: usize = 132;
+/// The tasks whose values are measured.
+const VALUES: [Task; 2] = [Task::Reward, Task::LongCost];
 
 /// A training run in memory.
 pub struct Learner<'d, T: Scalar> {
@@ -30,6 +38,8 @@ pub struct Learner<'d, T: Scalar> {
     model: Model,
     noise: Noise,
     reweighting: Reweighting,
+    /// By the frozen critics; none before they are, or where the actor is guided.
+    cloning: Option<Cloning>,
     state: LearnerState<T>,
     workers: Vec<Worker<T>>,
 }
@@ -60,14 +70,15 @@ impl<T: Scalar> LearnerState<T> {
 /// What one training step measured.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Metrics {
-    /// The critic's update.
-    pub critic: CriticMetrics,
-    /// The actor's and the dual's update, means over the batch.
-    pub actor: ActorLoss,
-    /// Smallest and largest `Q_r` of the batch at the policy's actions.
-    pub reward_range: [f64; 2],
-    /// Smallest and largest `Q_cL` of the batch at the policy's actions.
-    pub long_cost_range: [f64; 2],
+    /// The critic's update; none where it is frozen.
+    pub critic: Option<CriticMetrics>,
+    /// The actor's and the dual's update, means over the batch; none before the critics are trained.
+    pub actor: Option<ActorLoss>,
+    /// The weights of the batch, where the actor clones by advantage.
+    pub batch_weights: Option<BatchWeights>,
+    /// Smallest, mean and largest `Q_r` and `Q_cL` of the batch, at the policy's actions, or at the
+    /// recorded ones where the critics train alone; none where no critic was asked.
+    pub values: Option<[[f64; 3]; 2]>,
     /// Euclidean norms of the gradients that the optimisers saw: critic, actor, dual.
     pub gradient_norms: [f64; 3],
 }
@@ -96,7 +107,7 @@ impl<'d, T: Scalar> Learner<'d, T> {
         let shares = (0..config.batch).step_by(SHARE);
         let workers = shares.map(|first| Worker::new(&model, first, SHARE.min(config.batch - first))).collect();
         let mut reweighting = Reweighting::new(&config, data);
-        if state.step > config.reweight_warmup {
+        if reweighting.refreshes(state.step) > 0 {
             reweighting.restore(&state.counterfactual);
         }
         Self {
@@ -105,6 +116,7 @@ impl<'d, T: Scalar> Learner<'d, T> {
             model,
             noise: Noise::new(config.seed),
             reweighting,
+            cloning: None,
             state,
             workers,
             config,
@@ -113,8 +125,12 @@ impl<'d, T: Scalar> Learner<'d, T> {
 
     /// One training step (sections 3.2 to 3.4).
     pub fn step(&mut self) -> Metrics {
+        let phase = Phase::of(&self.config, self.state.step);
         if self.reweighting.is_due(self.state.step) {
             self.reweight();
+        }
+        if phase == Phase::Actor && self.cloning.is_none() {
+            self.cloning = self.judge_data();
         }
         self.gather();
 
@@ -132,30 +148,59 @@ impl<'d, T: Scalar> Learner<'d, T> {
         let (model, workers) = (&self.model, &mut self.workers);
 
         optimisers.schedule(&self.config, step);
-        let orders = pcgrad::orders([a, b, c]);
-        let (critic, critic_gradient) =
-            update_critic(model, parameters, optimisers, workers, &chain(stream::TARGET_CHAIN), &orders);
-        let (actor, [actor_gradient, dual_gradient]) =
-            update_actor(model, parameters, optimisers, workers, &chain(stream::POLICY_CHAIN));
-        update_target(parameters, self.config.target_rate);
-        soft_update(actor_average, &parameters.actor, T::of(1.0 - self.config.actor_average));
-
-        self.state.step += 1;
-        let range = |task| range(self.workers.iter().flat_map(|worker| worker.policy_values(task)));
-        Metrics {
-            critic,
-            actor,
-            reward_range: range(Task::Reward),
-            long_cost_range: range(Task::LongCost),
-            gradient_norms: [critic_gradient, actor_gradient, dual_gradient].map(|g| dot(&g, &g).sqrt()),
+        let mut metrics = Metrics::default();
+        if phase.trains_critics() {
+            let orders = pcgrad::orders([a, b, c]);
+            let draw = chain(stream::TARGET_CHAIN);
+            let (critic, gradient) = update_critic(model, parameters, optimisers, workers, &draw, &orders);
+            metrics.critic = Some(critic);
+            metrics.gradient_norms[0] = dot(&gradient, &gradient).sqrt();
+            update_target(parameters, self.config.target_rate);
         }
+        if phase == Phase::Critics {
+            metrics.values = Some(VALUES.map(|task| spread(workers.iter().flat_map(|w| w.recorded_values(task)))));
+        }
+        if phase.trains_actor() {
+            let gradients = if self.cloning.is_some() {
+                let mut shares: Vec<&mut [T]> = workers.iter_mut().map(|worker| &mut worker.batch.weight[..]).collect();
+                metrics.batch_weights = Some(weight::normalise(&mut shares));
+                let (cloning, gradient) = update_imitation(model, parameters, optimisers, workers);
+                metrics.actor = Some(ActorLoss { cloning, ..ActorLoss::default() });
+                [gradient, Vec::new()]
+            } else {
+                let draw = chain(stream::POLICY_CHAIN);
+                let (actor, gradients) = update_actor(model, parameters, optimisers, workers, &draw);
+                metrics.actor = Some(actor);
+                metrics.values = Some(VALUES.map(|task| spread(workers.iter().flat_map(|w| w.policy_values(task)))));
+                gradients
+            };
+            [metrics.gradient_norms[1], metrics.gradient_norms[2]] = gradients.map(|g| dot(&g, &g).sqrt());
+            soft_update(actor_average, &parameters.actor, T::of(1.0 - self.config.actor_average));
+        }
+        self.state.step += 1;
+        metrics
+    }
+
+    /// Judges all transitions, where the actor clones by their advantages.
+    pub(crate) fn judge_data(&self) -> Option<Cloning> {
+        let value = self.model.state_value.as_ref().filter(|_| self.config.extraction == Extraction::Weighted)?;
+        let parameters = &self.state.parameters;
+        let judges = Judges {
+            critic: (&self.model.critic, &parameters.target[..]),
+            value: (value, &parameters.state_value[..]),
+        };
+        let source = Source::new(&self.config, self.data, &self.normaliser);
+        Some(Cloning::new(&self.config, Advantages::new(&source, judges, self.data.len())))
     }
 
     /// Draws a batch of uniform transitions with replacement, and the noise of behaviour cloning.
+    ///
+    /// Weights are those of Eq. 10; where there are advantages, their logarithm plus that of the advantage weight.
     fn gather(&mut self) {
         let (step, noise, batch) = (self.state.step, self.noise, self.config.batch as u64);
         let levels = self.config.diffusion_steps as u32;
         let source = Source::new(&self.config, self.data, &self.normaliser);
+        let (cloning, condition) = (self.cloning.as_ref(), self.config.condition);
         let (weights, rows) = (&self.reweighting.weights().combined, self.data.len() as u32);
         self.workers.par_iter_mut().for_each(|worker| {
             for sample in 0..worker.batch.samples() {
@@ -164,7 +209,16 @@ impl<'d, T: Scalar> Learner<'d, T> {
                 let row = below(word(stream::ROWS), rows) as usize;
                 let extra = source.larger_budget(row, word(stream::BUDGET), word(stream::RELABEL));
                 source.fill(&mut worker.batch, sample, row, extra);
-                worker.batch.weight[sample] = T::of_f32(weights[row]);
+                let leniency = uniform(word(stream::LENIENCY));
+                worker.batch.weight[sample] = match cloning {
+                    None => T::of_f32(weights[row]),
+                    Some(cloning) => T::of(f64::from(weights[row]).ln() + cloning.log_weight(row, f64::from(leniency))),
+                };
+                match condition {
+                    Condition::Kappa => {}
+                    Condition::Lambda => worker.batch.condition[sample] = T::of_f32(leniency),
+                    Condition::None => worker.batch.condition[sample] = T::zero(),
+                }
                 worker.levels[sample] = 1 + below(word(stream::LEVELS), levels) as usize;
                 let mut column = worker.cloning.column_mut(sample);
                 stream::fill_normal(noise, stream::CLONING, step * batch + place as u64, column.as_mut_slice());
@@ -200,6 +254,11 @@ impl<'d, T: Scalar> Learner<'d, T> {
         self.reweighting.weights()
     }
 
+    /// Whether the dual learns in this run: it does where the actor is guided.
+    pub fn trains_dual(&self) -> bool {
+        self.config.extraction == Extraction::Guidance
+    }
+
     /// `lambda(kappa)` at budgets in units of recorded cost.
     pub fn lambda<const N: usize>(&self, kappas: [f64; N]) -> [f64; N] {
         let dual = &self.model.dual;
@@ -207,6 +266,11 @@ impl<'d, T: Scalar> Learner<'d, T> {
         let mut tape = dual.tape(N);
         dual.forward(&self.state.parameters.dual, &scaled, &mut tape);
         std::array::from_fn(|place| tape.lambda[place].to_f64())
+    }
+
+    /// The advantages that the actor clones by, once the critics are frozen.
+    pub fn advantages(&self) -> Option<&Advantages> {
+        self.cloning.as_ref().map(Cloning::advantages)
     }
 
     /// Refreshes of the weights so far.
@@ -220,9 +284,14 @@ impl<'d, T: Scalar> Learner<'d, T> {
     }
 }
 
-/// The smallest and the largest of some values.
-fn range<T: Scalar>(values: impl Iterator<Item = T>) -> [f64; 2] {
-    values
-        .map(T::to_f64)
-        .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| [low.min(value), high.max(value)])
+/// The smallest, the mean and the largest of some values.
+fn spread<T: Scalar>(values: impl Iterator<Item = T>) -> [f64; 3] {
+    let (mut low, mut high, mut sum, mut count) = (f64::INFINITY, f64::NEG_INFINITY, 0.0, 0.0);
+    for value in values.map(T::to_f64) {
+        (low, high, sum, count) = (low.min(value), high.max(value), sum + value, count + 1.0);
+    }
+    [low, sum / count, high]
 }
+
+#[cfg(test)]
+mod tests;

@@ -16,17 +16,20 @@
 
 pub mod actor;
 pub mod batch;
+pub mod calibrate;
 pub mod cli;
 pub mod config;
 pub mod critic;
 pub mod data;
 pub mod dual;
 pub mod export;
+pub mod extraction;
 pub mod learner;
 pub mod model;
 pub mod nn;
 pub mod normaliser;
 pub mod pcgrad;
+pub mod phase;
 pub mod quantize;
 pub mod report;
 pub mod reweight;

@@ -7,10 +7,13 @@ use serde::{Deserialize, Serialize};
 use crate::actor::denoiser::{Denoiser, Widths};
 use crate::actor::{Actor, Family, Process};
 use crate::config::Config;
+use crate::critic::bootstrap::Bootstrap;
+use crate::critic::value::StateValue;
 use crate::critic::{Critic, CriticOptions, Trunk};
 use crate::dual::{Dual, DualOptions};
 use crate::nn::{Adam, Scalar};
 use crate::pcgrad::{Order, Pooling};
+use crate::phase::Phase;
 use crate::stream;
 
 /// Layouts and fixed settings of the networks.
@@ -20,6 +23,8 @@ pub struct Model {
     pub actor: Actor,
     /// The multi-task critic.
     pub critic: Critic,
+    /// The state values that targets bootstrap from; none where they ask the policy.
+    pub state_value: Option<StateValue>,
     /// The dual variable.
     pub dual: Dual,
     /// Factor on the squared norm of the dual's weights in its loss.
@@ -46,6 +51,8 @@ pub struct Parameters<T: Scalar> {
     pub critic: Vec<T>,
     /// Target critic, theta minus.
     pub target: Vec<T>,
+    /// State values; empty where there are none.
+    pub state_value: Vec<T>,
     /// Dual network.
     pub dual: Vec<T>,
 }
@@ -58,6 +65,8 @@ pub struct Optimisers<T: Scalar> {
     pub actor: Adam<T>,
     /// Of the critic.
     pub critic: Adam<T>,
+    /// Of the state values.
+    pub state_value: Adam<T>,
     /// Of the dual network.
     pub dual: Adam<T>,
 }
@@ -83,7 +92,10 @@ impl Model {
             variance: config.reverse_variance,
             temperature: config.temperature,
         };
-        let denoiser = Denoiser::new(widths, config.kappa_scale);
+        let denoiser = Denoiser::new(widths, config.condition_scale());
+        // A critic that shall not tell budgets apart sees 0.
+        let critic_scale = if config.critic_sees_kappa { config.kappa_scale } else { 0.0 };
+        let expectiles = [config.reward_expectile, config.cost_expectile, config.cost_expectile];
         Self {
             actor: Actor {
                 denoiser: match config.policy {
@@ -107,8 +119,10 @@ impl Model {
                     twin_loss: config.twin_loss,
                 },
                 [state, action, config.trunk, config.head],
-                config.kappa_scale,
+                critic_scale,
             ),
+            state_value: (config.bootstrap == Bootstrap::InSample)
+                .then(|| StateValue::new(state, config.trunk, critic_scale, expectiles)),
             dual: Dual::new(
                 DualOptions {
                     log_range: [config.log_lambda_min, config.log_lambda_max],
@@ -144,7 +158,12 @@ impl Model {
         self.actor.denoiser.initialise(&mut actor, &mut draws(0));
         self.critic.initialise(&mut critic, &mut draws(1));
         self.dual.initialise(&mut dual, &mut draws(2));
-        Parameters { actor, target: critic.clone(), critic, dual }
+        let mut state_value = Vec::new();
+        if let Some(value) = &self.state_value {
+            state_value.resize(value.size(), T::zero());
+            value.initialise(&mut state_value, &mut draws(3));
+        }
+        Parameters { actor, target: critic.clone(), critic, state_value, dual }
     }
 }
 
@@ -154,17 +173,19 @@ impl<T: Scalar> Optimisers<T> {
         Self {
             actor: Adam::new(parameters.actor.len(), config.actor_rate),
             critic: Adam::new(parameters.critic.len(), config.critic_rate),
+            state_value: Adam::new(parameters.state_value.len(), config.critic_rate),
             dual: Adam::new(parameters.dual.len(), config.dual_rate),
         }
     }
 
     /// Sets the learning rates of a training step: along half a cosine from the
-    /// configured ones to their `final_rate` share (O-30).
+    /// configured ones to their `final_rate` share at the end of its phase (O-30).
     pub fn schedule(&mut self, config: &Config, step: u64) {
-        let cosine = 0.5 + 0.5 * (std::f64::consts::PI * step as f64 / config.steps as f64).cos();
+        let cosine = 0.5 + 0.5 * (std::f64::consts::PI * Phase::progress(config, step)).cos();
         let factor = config.final_rate + (1.0 - config.final_rate) * cosine;
         self.actor.set_rate(config.actor_rate * factor);
         self.critic.set_rate(config.critic_rate * factor);
+        self.state_value.set_rate(config.critic_rate * factor);
         self.dual.set_rate(config.dual_rate * factor);
     }
 }
@@ -180,7 +201,8 @@ mod tests {
         let mut config = Preset::Paper.config("own", 1.0);
         (config.steps, config.actor_rate, config.final_rate) = (10, 1.0, 0.2);
         let first_step = |step| {
-            let mut parameters = Parameters { actor: vec![0.0f64], critic: vec![], target: vec![], dual: vec![] };
+            let mut parameters =
+                Parameters { actor: vec![0.0f64], critic: vec![], target: vec![], state_value: vec![], dual: vec![] };
             let mut optimisers = Optimisers::new(&config, &parameters);
             optimisers.schedule(&config, step);
             optimisers.actor.descend(&mut parameters.actor, &[1.0]);

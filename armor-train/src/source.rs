@@ -59,6 +59,7 @@ impl<'a> Source<'a> {
         batch.reward[sample] = T::of(f64::from(data.reward(row)) * config.reward_scale);
         batch.cost[sample] = T::of(cost(data.cost(row)));
         batch.kappa[sample] = T::of(kappa);
+        batch.condition[sample] = T::of(kappa);
         batch.next_kappa[sample] = T::of(cost(data.kappa_next(row) + extra));
         let spendable = match config.threshold {
             Threshold::Kappa => kappa,

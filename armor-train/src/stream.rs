@@ -19,12 +19,22 @@ pub(crate) const SHUFFLE: u32 = 5;
 pub(crate) const BUDGET: u32 = 7;
 /// The budget it is relabelled with; the tick is the training step.
 pub(crate) const RELABEL: u32 = 8;
+/// Leniency that a sample is cloned under; the tick is the training step.
+pub(crate) const LENIENCY: u32 = 9;
 /// Noise of behaviour cloning; the tick is the sample (step times batch, plus its place).
 pub(crate) const CLONING: u32 = 6;
 /// Chain of the next actions, one stream a stage; the tick is the sample.
 pub(crate) const TARGET_CHAIN: u32 = 0x100;
 /// Chain of the policy's actions, one stream a stage; the tick is the sample.
 pub(crate) const POLICY_CHAIN: u32 = 0x200;
+/// Initial weights of an evaluation of policies.
+pub(crate) const EVALUATION_START: u32 = 10;
+/// Rows of a batch of it; the tick is its step.
+pub(crate) const EVALUATION_ROWS: u32 = 11;
+/// Leniencies of a batch of it; the tick is its step.
+pub(crate) const EVALUATION_LENIENCY: u32 = 12;
+/// Chain of its actions, one stream a stage; the tick is the sample.
+pub(crate) const EVALUATION_CHAIN: u32 = 0x300;
 /// Perturbed actions, one stream a perturbation; the tick is the refresh times rows, plus the row.
 pub(crate) const PERTURBATION: u32 = 0x400;
 

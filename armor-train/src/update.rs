@@ -11,6 +11,7 @@ use crate::actor::chain::{Chain, Draw};
 use crate::actor::denoiser::Context;
 use crate::actor::{ActorLoss, ActorNoise, ActorTape, Judges};
 use crate::batch::Batch;
+use crate::critic::bootstrap::InSample;
 use crate::critic::{CriticTape, Task, bellman_target};
 use crate::model::{Model, Optimisers, Parameters};
 use crate::nn::{Scalar, accumulate, clip_norm, soft_update};
@@ -31,6 +32,8 @@ pub struct Worker<T: Scalar> {
     next_chain: Chain<T>,
     target_tape: CriticTape<T>,
     critic_tape: CriticTape<T>,
+    /// Where targets bootstrap from state values.
+    in_sample: Option<InSample<T>>,
     targets: Vec<T>,
     /// Gradient of the heads; its trunk part stays zero.
     critic_gradient: Vec<T>,
@@ -47,6 +50,8 @@ pub struct Worker<T: Scalar> {
 pub struct CriticMetrics {
     /// Losses of reward, long-term and short-term cost, summed over the twins (Eq. 4).
     pub losses: [f64; 3],
+    /// Expectile losses of the state values; 0 where there are none.
+    pub value_losses: [f64; 3],
     /// Conflicts and norms of the tasks' trunk gradients (Eq. 5, Table A1).
     pub surgery: Surgery,
 }
@@ -65,6 +70,7 @@ impl<T: Scalar> Worker<T> {
             next_chain: Chain::new(denoiser, model.target_chain.clone(), samples, 0),
             target_tape: model.critic.tape(samples),
             critic_tape: model.critic.tape(samples),
+            in_sample: model.state_value.as_ref().map(|value| InSample::new(value, samples)),
             targets: Vec::with_capacity(samples),
             critic_gradient: vec![T::zero(); model.critic.size()],
             trunk_gradients: [(); 3].map(|()| vec![T::zero(); model.critic.trunk_size()]),
@@ -91,23 +97,37 @@ impl<T: Scalar> Worker<T> {
         self.actor_tape.values(task)
     }
 
+    /// The critic's pessimistic values of a task at the recorded actions, before its last update.
+    pub fn recorded_values(&self, task: Task) -> impl Iterator<Item = T> {
+        self.critic_tape.pessimistic(task)
+    }
+
     /// Eqs. 3 and 4: targets, losses and the gradient of each task.
     fn judge(&mut self, model: &Model, parameters: &Parameters<T>, batch_len: usize, draw: &Draw<'_, T>) {
-        let Self { batch, next_context, next_chain, target_tape, critic_tape, targets, .. } = self;
-        let (first, denoiser, critic) = (self.first, &model.actor.denoiser, &model.critic);
-        denoiser.prepare(&parameters.actor, &batch.next_state, &batch.next_kappa, next_context);
-        let draw = |stage: usize, sample: usize, out: &mut [T]| draw(stage, first + sample, out);
-        next_chain.run(denoiser, &parameters.actor, next_context, &draw);
-        let next = (&batch.next_state, &batch.next_kappa[..], &next_chain.action);
-        critic.forward(&parameters.target, &Task::ALL, next, target_tape, false);
+        let Self { batch, target_tape, critic_tape, in_sample, targets, .. } = self;
+        let critic = &model.critic;
         let recorded = (&batch.state, &batch.kappa[..], &batch.action);
+        if let (Some(in_sample), Some(value)) = (&mut *in_sample, &model.state_value) {
+            critic.forward(&parameters.target, &Task::ALL, recorded, target_tape, false);
+            in_sample.regress((value, &parameters.state_value), (batch, batch_len), target_tape);
+        } else {
+            let (first, denoiser) = (self.first, &model.actor.denoiser);
+            denoiser.prepare(&parameters.actor, &batch.next_state, &batch.next_kappa, &mut self.next_context);
+            let draw = |stage: usize, sample: usize, out: &mut [T]| draw(stage, first + sample, out);
+            self.next_chain.run(denoiser, &parameters.actor, &self.next_context, &draw);
+            let next = (&batch.next_state, &batch.next_kappa[..], &self.next_chain.action);
+            critic.forward(&parameters.target, &Task::ALL, next, target_tape, false);
+        }
         critic.forward(&parameters.critic, &Task::ALL, recorded, critic_tape, true);
 
         self.critic_gradient.fill(T::zero());
         for (index, task) in Task::ALL.into_iter().enumerate() {
             let signal = if task == Task::Reward { &batch.reward } else { &batch.cost };
-            let next_value = target_tape.pessimistic(task);
-            bellman_target(signal, &batch.alive, model.discounts[index], next_value, targets);
+            let discount = model.discounts[index];
+            match in_sample {
+                Some(value) => bellman_target(signal, &batch.alive, discount, value.next_values(task), targets),
+                None => bellman_target(signal, &batch.alive, discount, target_tape.pessimistic(task), targets),
+            }
             let trunk_gradient = &mut self.trunk_gradients[index];
             trunk_gradient.fill(T::zero());
             let gradients = (&mut self.critic_gradient[..], &mut trunk_gradient[..]);
@@ -138,6 +158,21 @@ impl<T: Scalar> Worker<T> {
             (&mut self.actor_gradient, &mut self.dual_gradient),
         );
     }
+
+    /// Eq. 13: the gradient of the actor.
+    fn imitate(&mut self, model: &Model, actor: &[T], batch_len: usize) {
+        self.actor_gradient.fill(T::zero());
+        self.actor_loss = ActorLoss {
+            cloning: model.actor.imitate(
+                actor,
+                (&self.batch, batch_len),
+                (&self.levels, &self.cloning),
+                &mut self.actor_tape,
+                &mut self.actor_gradient,
+            ),
+            ..ActorLoss::default()
+        };
+    }
 }
 
 /// The networks that judge the actor.
@@ -145,7 +180,8 @@ fn judges<'a, T: Scalar>(model: &'a Model, parameters: &'a Parameters<T>) -> Jud
     Judges { critic: (&model.critic, &parameters.critic), dual: (&model.dual, &parameters.dual) }
 }
 
-/// Updates the critic: Eqs. 3 and 4 in every share, Eq. 5 on the trunk, one step of Adam.
+/// Updates the critic: Eqs. 3 and 4 in every share, Eq. 5 on the trunk, one step of Adam;
+/// and the state values, where targets bootstrap from them.
 ///
 /// `draw` gives the noise of the next actions by stage and place in the batch,
 /// `orders` the order of the others for each task. Returns the gradient with the metrics.
@@ -163,6 +199,7 @@ pub fn update_critic<T: Scalar>(
 
     let mut gradient = vec![T::zero(); model.critic.size()];
     let mut trunk = [(); 3].map(|()| vec![T::zero(); model.critic.trunk_size()]);
+    let mut value_gradient = vec![T::zero(); parameters.state_value.len()];
     let mut metrics = CriticMetrics::default();
     for worker in workers {
         accumulate(&mut gradient, &worker.critic_gradient);
@@ -172,12 +209,44 @@ pub fn update_critic<T: Scalar>(
         for (sum, part) in metrics.losses.iter_mut().zip(worker.critic_losses) {
             *sum += part / batch_len as f64;
         }
+        if let Some(in_sample) = &worker.in_sample {
+            accumulate(&mut value_gradient, &in_sample.gradient);
+            for (sum, part) in metrics.value_losses.iter_mut().zip(in_sample.losses) {
+                *sum += part / batch_len as f64;
+            }
+        }
     }
     let orders = (model.pcgrad != Order::Off).then_some(orders);
     metrics.surgery = pcgrad::project(&trunk, orders, model.trunk_gradient, &mut gradient[..model.critic.trunk_size()]);
     clip_norm(&mut gradient, model.gradient_clip);
+    clip_norm(&mut value_gradient, model.gradient_clip);
     optimisers.critic.descend(&mut parameters.critic, &gradient);
+    optimisers.state_value.descend(&mut parameters.state_value, &value_gradient);
     (metrics, gradient)
+}
+
+/// Updates the actor by weighted cloning alone (Eq. 13), one step of Adam.
+///
+/// Returns the loss as a mean over the batch, and the gradient.
+pub fn update_imitation<T: Scalar>(
+    model: &Model,
+    parameters: &mut Parameters<T>,
+    optimisers: &mut Optimisers<T>,
+    workers: &mut [Worker<T>],
+) -> (f64, Vec<T>) {
+    let batch_len = workers.iter().map(|worker| worker.batch.samples()).sum();
+    let shared = &parameters.actor[..];
+    workers.par_iter_mut().for_each(|worker| worker.imitate(model, shared, batch_len));
+
+    let mut gradient = vec![T::zero(); parameters.actor.len()];
+    let mut loss = 0.0;
+    for worker in workers {
+        accumulate(&mut gradient, &worker.actor_gradient);
+        loss += worker.actor_loss.cloning / batch_len as f64;
+    }
+    clip_norm(&mut gradient, model.gradient_clip);
+    optimisers.actor.descend(&mut parameters.actor, &gradient);
+    (loss, gradient)
 }
 
 /// Updates actor and dual (Eqs. 15 and 16), one step of Adam each, judged by the live critic.

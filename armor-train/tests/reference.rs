@@ -83,6 +83,7 @@ impl Reference {
             critic: Critic::new(STATE, ACTION, 12, 10, kappa_scale),
             dual: Dual::new(DualOptions::default(), 9, kappa_scale),
             dual_decay: 0.0,
+            state_value: None,
             target_chain: schedule.chain(Sampler::Ddpm, STEPS).collect(),
             discounts: [0.99, 0.99, 0.3],
             gradient_clip: 0.0,
@@ -96,6 +97,7 @@ impl Reference {
             actor: self.numbers("actor"),
             critic: self.numbers("critic"),
             target: self.numbers("target_critic"),
+            state_value: Vec::new(),
             dual: self.numbers("dual"),
         }
     }
@@ -104,6 +106,7 @@ impl Reference {
         Optimisers {
             actor: Adam::new(parameters.actor.len(), 1e-4),
             critic: Adam::new(parameters.critic.len(), 1e-3),
+            state_value: Adam::new(0, 1e-3),
             dual: Adam::new(parameters.dual.len(), 1e-4),
         }
     }

@@ -59,6 +59,7 @@ impl Parts {
             SectionKind::Scales => Vec::new(),
             SectionKind::Chain => chain.clone(),
             SectionKind::Golden => vec![0; 4],
+            SectionKind::BudgetMap => Vec::new(),
         });
         let provenance = Provenance {
             version: "0.0.0",

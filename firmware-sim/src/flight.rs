@@ -103,6 +103,8 @@ pub struct Flight {
 pub struct Episode {
     /// Its control steps, in order.
     pub ticks: Vec<Tick>,
+    /// Goals that were reached; none where the plant does not count them.
+    pub goals: Option<u32>,
 }
 
 /// A control step.
@@ -149,8 +151,7 @@ impl Episode {
 pub fn fly(image: &PolicyImage<'_>, plan: &FlightPlan) -> Result<Flight, FlightError> {
     let mut plant = plan.task.plant()?;
     let hold = check(image, plan)?;
-    let policy = Policy::load(image).map_err(FlightError::Load)?;
-    let mut controller = HostController::new(policy, plan.limit, 0).map_err(FlightError::Load)?;
+    let mut controller = controller(image, plan)?;
     let mut episodes = Vec::new();
     for index in 0..plan.episodes {
         plant.reset(episode_seed(plan.seed, Use::Plant, index));
@@ -163,10 +164,16 @@ pub fn fly(image: &PolicyImage<'_>, plan: &FlightPlan) -> Result<Flight, FlightE
     Ok(Flight { episodes, latency, summary })
 }
 
+/// The image's controller, if it may be given the plan's limit.
+pub(crate) fn controller<'a>(image: &PolicyImage<'a>, plan: &FlightPlan) -> Result<HostController<'a>, FlightError> {
+    let policy = Policy::load(image).map_err(FlightError::Load)?;
+    HostController::new(policy, plan.limit, 0).map_err(FlightError::Load)
+}
+
 /// Whether image, task and rate go together; how many plant steps hold an action.
-fn check(image: &PolicyImage<'_>, plan: &FlightPlan) -> Result<usize, FlightError> {
+pub(crate) fn check(image: &PolicyImage<'_>, plan: &FlightPlan) -> Result<usize, FlightError> {
     let (task, manifest) = (plan.task, image.manifest());
-    if manifest.task != task.name {
+    if !task.flies(manifest.task) {
         return Err(FlightError::WrongTask { image: manifest.task.into(), task: task.name });
     }
     let (state, action) = (usize::from(manifest.shape.state), usize::from(manifest.shape.action));

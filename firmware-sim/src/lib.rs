@@ -8,6 +8,7 @@
 //! | [`image_file`], [`chip`] | an image in a file; two slots of flash that boot one |
 //! | [`host`], [`flight`], [`summary`] | the controller on this computer, in a fixed-rate loop, and its scores |
 //! | [`link`] | the controller behind a wire, for a robot or its simulator |
+//! | [`simulator`] | the simulators that fly the tasks of the paper, over the link |
 //! | [`latency`], [`telemetry`] | what each action took; a line a control step |
 //! | [`reference`](mod@reference), [`verify`](mod@verify) | a second evaluation in f64; the checks of an image |
 //! | [`cli`] | the commands |
@@ -40,6 +41,7 @@ pub mod plant;
 #[cfg(test)]
 mod recorded;
 pub mod reference;
+pub mod simulator;
 pub mod summary;
 pub mod task;
 pub mod telemetry;

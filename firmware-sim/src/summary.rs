@@ -41,6 +41,12 @@ pub struct FlightSummary {
     pub cost_normalized_std: f64,
     /// Episodes that stayed within the limit.
     pub safe_episodes: u32,
+    /// Share of episodes that reached a goal; none where there is none to count.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub success_rate: Option<f64>,
+    /// Mean number of goals reached in an episode.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub goals: Option<f64>,
     /// Control steps.
     pub actions: u64,
     /// Control steps that were not ordinary ones.
@@ -60,6 +66,10 @@ impl FlightSummary {
         let (cost, cost_std) = over(&Episode::cost);
         let (reward_normalized, reward_normalized_std) = over(&|e| plan.task.reward_normalized(e.reward()));
         let (cost_normalized, cost_normalized_std) = over(&|e| task::cost_normalized(e.cost(), limit));
+        let goals: Option<Vec<f64>> = match plan.task.has_goal() {
+            true => episodes.iter().map(|episode| episode.goals.map(f64::from)).collect(),
+            false => None,
+        };
         let ticks = || episodes.iter().flat_map(|episode| &episode.ticks);
         let period = Duration::from_micros(plan.period().0);
         Self {
@@ -77,6 +87,10 @@ impl FlightSummary {
             cost_normalized,
             cost_normalized_std,
             safe_episodes: episodes.iter().filter(|episode| episode.cost() <= limit).count() as u32,
+            success_rate: goals
+                .as_ref()
+                .map(|goals| goals.iter().filter(|&&count| count > 0.0).count() as f64 / goals.len() as f64),
+            goals: goals.as_deref().map(mean),
             actions: ticks().count() as u64,
             faults: episodes.iter().map(|episode| episode.faults().count() as u64).sum(),
             deadline_misses: ticks().filter(|tick| tick.latency > period).count() as u64,
@@ -105,6 +119,9 @@ impl fmt::Display for FlightSummary {
         writeln!(f, "normalised reward   {:>10.3} +- {:.3}", self.reward_normalized, self.reward_normalized_std)?;
         writeln!(f, "normalised cost     {:>10.3} +- {:.3}", self.cost_normalized, self.cost_normalized_std)?;
         writeln!(f, "episodes in limit   {:>10} of {}", self.safe_episodes, self.episodes)?;
+        if let (Some(success_rate), Some(goals)) = (self.success_rate, self.goals) {
+            writeln!(f, "success             {success_rate:>10.2} of episodes, {goals:.1} goals in each")?;
+        }
         writeln!(f, "faults              {:>10} of {} actions", self.faults, self.actions)?;
         writeln!(f, "missed deadlines    {:>10} of {} actions", self.deadline_misses, self.actions)?;
         write!(
@@ -128,6 +145,7 @@ mod tests {
         let step = Step { action: Default::default(), kappa: Default::default(), rung: Some(0), fault };
         Episode {
             ticks: vec![Tick { time: Micros(0), step, reward, cost, latency: Duration::from_micros(latency_us) }],
+            goals: None,
         }
     }
 

@@ -56,7 +56,7 @@ pub enum TaskError {
         name: String,
     },
     /// The task belongs to a simulator.
-    #[error("{task} needs its simulator, and only native tasks fly so far; use {}", native_names())]
+    #[error("{task} needs its simulator: fly it by armor-train evaluate; native tasks are {}", native_names())]
     NotNative {
         /// The task.
         task: &'static str,
@@ -83,6 +83,13 @@ pub const TASKS: [Task; 18] = [
     simulated("SafetyCarGoal1-v0", [72, 2, 1000], [0.0122328, 39.907809], 20.0, 25),
     simulated("SafetyCarPush1-v0", [88, 2, 1000], [0.0137002, 16.304468], 20.0, 25),
     simulated("SafetyCarButton1-v0", [88, 2, 1000], [0.0028926, 44.420003], 20.0, 25),
+];
+
+/// Native tasks, and the simulators' tasks that they stand for.
+const STANDS_FOR: [(&str, &str); 3] = [
+    ("ball-run", "SafetyBallRun-v0"),
+    ("point-circle", "SafetyPointCircle1-v0"),
+    ("point-goal", "SafetyPointGoal1-v0"),
 ];
 
 const fn simulated(name: &'static str, size: [usize; 3], returns: [f64; 2], cost_limit: f32, rate_hz: u32) -> Task {
@@ -116,6 +123,18 @@ impl Task {
             "point-goal" => Ok(Box::new(PointGoal::default())),
             task => Err(TaskError::NotNative { task }),
         }
+    }
+
+    /// Whether a policy that was trained for the task `trained` flies this one:
+    /// it is the same, or a native task and the simulator's that it stands for.
+    pub fn flies(&self, trained: &str) -> bool {
+        let pair = |native: &str, simulator| STANDS_FOR.contains(&(native, simulator));
+        self.name == trained || pair(self.name, trained) || pair(trained, self.name)
+    }
+
+    /// Whether an episode can succeed: a goal to reach, a box to push, a button to press.
+    pub fn has_goal(&self) -> bool {
+        ["goal", "Goal", "Push", "Button"].iter().any(|word| self.name.contains(word))
     }
 
     /// Eq. 17 for a reward return: 0 at [`Task::reward_min`], 1 at [`Task::reward_max`].
@@ -162,9 +181,25 @@ mod tests {
     }
 
     #[test]
-    fn a_native_task_has_the_protocol_of_its_simulator() {
-        let (native, simulator) = (Task::named("ball-run").unwrap(), Task::named("SafetyBallRun-v0").unwrap());
-        assert_eq!(Task { name: native.name, world: native.world, ..*simulator }, *native);
+    fn a_native_task_has_the_protocol_of_its_simulator_and_flies_its_policies() {
+        for (native, simulator) in STANDS_FOR.map(|(a, b)| (Task::named(a).unwrap(), Task::named(b).unwrap())) {
+            assert_eq!(Task { name: native.name, world: native.world, ..*simulator }, *native);
+            assert!(native.flies(simulator.name) && simulator.flies(native.name) && native.flies(native.name));
+        }
+        assert!(!Task::named("ball-run").unwrap().flies("ball-circle"));
+    }
+
+    /// The Python package's table.
+    #[test]
+    fn the_plants_table_is_this_one() {
+        let table: Vec<serde_json::Value> =
+            serde_json::from_str(include_str!("../python/src/armor_plant/tasks.json")).unwrap();
+        let simulated = TASKS.iter().filter(|task| task.world == World::Simulator);
+        let mut expected: Vec<_> = simulated.map(|task| serde_json::to_value(task).unwrap()).collect();
+        for row in &mut expected {
+            row.as_object_mut().unwrap().remove("world");
+        }
+        assert_eq!(table, expected);
     }
 
     #[test]

@@ -32,6 +32,8 @@ pub enum ImageError {
     Chain,
     /// The scale of the cost budget is not a finite positive number.
     KappaRange,
+    /// The budget map has too few or too many knots, or they are not finite or not in order.
+    BudgetMap,
     /// A section is missing, out of order, or its length does not fit the shape.
     Section(SectionKind),
     /// A section holds a NaN or an infinity.
@@ -61,6 +63,9 @@ impl fmt::Display for ImageError {
             Self::Shape => f.write_str("image has a dimension of zero or beyond the format's limits"),
             Self::Chain => f.write_str("image has no valid denoising chain"),
             Self::KappaRange => f.write_str("image has no valid scale of the cost budget"),
+            Self::BudgetMap => {
+                f.write_str("image has no valid map from the cost budget; calibrate and export it again")
+            }
             Self::Section(kind) => write!(f, "image section {kind:?} is missing, misplaced or of the wrong length"),
             Self::NotFinite(kind) => {
                 write!(f, "image section {kind:?} holds a NaN or an infinity; the training diverged")

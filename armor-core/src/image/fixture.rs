@@ -86,6 +86,7 @@ impl Parts {
         contents.push(steps.flat_map(|step| step.to_f32().to_words()).collect());
         let row = (0..GoldenTrace::row_words(s, a) as u32).map(|i| word(14, i));
         contents.push([7, 8, 5 << 16, 1].into_iter().chain(row).collect());
+        contents.push(Vec::new());
         Self { manifest, contents }
     }
 

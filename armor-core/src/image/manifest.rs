@@ -35,7 +35,7 @@ pub struct Manifest<'a> {
     pub agreement_max_abs: f32,
     /// Flights of this policy on the task's native plant; empty where there is none.
     pub quality: Vec<Quality, MAX_RUNGS>,
-    /// Where each section lies; in the order of [`SectionKind::ALL`].
+    /// Where each section lies; in the order of [`SectionKind::ALL`], without those that are left out.
     pub sections: Vec<Section, SECTION_COUNT>,
 }
 
@@ -156,11 +156,13 @@ pub enum SectionKind {
     Chain,
     /// The golden trace: what the controller must reproduce bit for bit.
     Golden,
+    /// Knots from the remaining budget to the condition of the policy; left out where that is the budget itself.
+    BudgetMap,
 }
 
 impl SectionKind {
     /// All sections, in the order in which they lie in an image.
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 15] = [
         Self::StateNormaliser,
         Self::ActionBounds,
         Self::Kappa1,
@@ -175,7 +177,13 @@ impl SectionKind {
         Self::Scales,
         Self::Chain,
         Self::Golden,
+        Self::BudgetMap,
     ];
+
+    /// Whether an image may do without the section; it then has no entry in the table.
+    pub(super) const fn is_optional(self) -> bool {
+        matches!(self, Self::BudgetMap)
+    }
 }
 
 impl<'a> Manifest<'a> {

@@ -3,6 +3,7 @@
 use super::manifest::{Manifest, SectionKind};
 use super::sections::Dense;
 use super::{ALIGNMENT, ImageError};
+use crate::budget_map::BudgetMap;
 
 /// Takes the sections from the body, one after the other.
 pub(super) struct Reader<'m, 'a> {
@@ -62,6 +63,17 @@ impl<'m, 'a> Reader<'m, 'a> {
     pub(super) fn dense(&mut self, kind: SectionKind, inputs: usize, outputs: usize) -> Result<Dense<'a>, ImageError> {
         let (weights, bias) = self.pair(kind, inputs * outputs, outputs)?;
         Ok(Dense { weights, bias })
+    }
+
+    /// The knots of the budget map, if the table names it.
+    pub(super) fn budget_map(&mut self) -> Result<Option<BudgetMap<'a>>, ImageError> {
+        if self.manifest.sections.get(self.next).is_none_or(|section| section.kind != SectionKind::BudgetMap) {
+            return Ok(None);
+        }
+        match self.words(SectionKind::BudgetMap, None)?.as_chunks() {
+            (knots, []) => BudgetMap::new(knots).map(Some).ok_or(ImageError::BudgetMap),
+            _ => Err(ImageError::Section(SectionKind::BudgetMap)),
+        }
     }
 
     /// The last section ends where the image ends, and no section follows it.

@@ -5,6 +5,7 @@ use super::golden::GoldenTrace;
 use super::manifest::{Manifest, Precision, SectionKind};
 use super::network::{FloatNetwork, IntegerNetwork, Network};
 use super::reader::Reader;
+use crate::budget_map::BudgetMap;
 use crate::schedule::ChainStep;
 
 #[cfg(target_endian = "big")]
@@ -38,6 +39,8 @@ pub struct Sections<'a> {
     pub network: Network<'a>,
     /// The golden trace.
     pub golden: GoldenTrace<'a>,
+    /// What the policy is conditioned on at a budget; none where that is the budget itself.
+    pub budget_map: Option<BudgetMap<'a>>,
     chain: &'a [[u32; ChainStep::WORDS]],
 }
 
@@ -78,11 +81,22 @@ impl<'a> Sections<'a> {
         let chain_steps = manifest.rungs.iter().map(|rung| usize::from(rung.steps)).sum::<usize>();
         let chain = reader.words(SectionKind::Chain, Some(chain_steps * ChainStep::WORDS))?;
         let golden = GoldenTrace::read(reader.words(SectionKind::Golden, None)?, s, a)?;
+        let budget_map = reader.budget_map()?;
         reader.finish()?;
 
         let (chain, _) = chain.as_chunks();
-        let sections =
-            Self { state_mean, state_factor, action_low, action_high, action_fallback, kappa, network, golden, chain };
+        let sections = Self {
+            state_mean,
+            state_factor,
+            action_low,
+            action_high,
+            action_fallback,
+            kappa,
+            network,
+            golden,
+            budget_map,
+            chain,
+        };
         sections.check_bounds()?;
         sections.check_chains(manifest)?;
         Ok(sections)

@@ -113,7 +113,8 @@ fn a_buffer_that_is_too_small_is_full() {
 
 #[test]
 fn a_section_of_the_wrong_length_is_named() {
-    for kind in SectionKind::ALL {
+    let required = SectionKind::ALL.into_iter().filter(|kind| !kind.is_optional());
+    for kind in required {
         let mut longer = Parts::new(SHAPE);
         longer.section(kind).push(0);
         assert_eq!(longer.fault(), ImageError::Section(kind));
@@ -197,6 +198,40 @@ fn a_chain_goes_down_and_ends_at_the_estimate() {
         assert_eq!(edited(6, word, 0.5f32.to_bits()), ImageError::Chain);
         assert_eq!(edited(7, word, 0.5f32.to_bits()), ImageError::Chain, "the second rung ends there too");
     }
+}
+
+fn with_map(knots: &[[u32; 2]]) -> Parts {
+    let mut parts = Parts::new(SHAPE);
+    *parts.section(SectionKind::BudgetMap) = knots.concat();
+    parts
+}
+
+#[test]
+fn a_budget_map_is_read_back_and_an_image_without_one_has_no_trace_of_it() {
+    let knots = [[0, 0.25f32.to_bits()], [5 << 16, 0.75f32.to_bits()]];
+    let (mut memory, _) = with_map(&knots).build();
+    let image = PolicyImage::new_checked(memory.bytes()).unwrap();
+    let map = image.sections().budget_map.unwrap();
+    assert_eq!(
+        map.knots().map(|(budget, condition)| [budget.to_raw(), condition.to_bits()]).collect::<Vec<_>>(),
+        knots
+    );
+    assert_eq!(image.manifest().sections.len(), SECTION_COUNT);
+
+    let (mut memory, _) = Parts::new(SHAPE).build();
+    let image = PolicyImage::new_checked(memory.bytes()).unwrap();
+    assert_eq!((image.sections().budget_map, image.manifest().sections.len()), (None, SECTION_COUNT - 1));
+}
+
+#[test]
+fn a_budget_map_out_of_order_is_named() {
+    let one = 1f32.to_bits();
+    for knots in [&[[0, one]][..], &[[5, 0], [5, one]], &[[5, one], [6, 0]], &[[5, 0], [6, f32::NAN.to_bits()]]] {
+        assert_eq!(with_map(knots).fault(), ImageError::BudgetMap, "{knots:?}");
+    }
+    let mut half = with_map(&[[0, 0], [1, one]]);
+    half.section(SectionKind::BudgetMap).push(2);
+    assert_eq!(half.fault(), ImageError::Section(SectionKind::BudgetMap));
 }
 
 #[test]

@@ -29,7 +29,7 @@ impl core::error::Error for WriteError {}
 /// Writes an image into `out` and returns its length in bytes.
 ///
 /// `contents` holds the words of each section in the order of
-/// [`SectionKind::ALL`]; the manifest's section table is made here, whatever
+/// [`SectionKind::ALL`], an optional one that has none is left out; the manifest's section table is made here, whatever
 /// it was. `out` must start on a 16-byte boundary, for what was written is
 /// read back with every check.
 ///
@@ -39,7 +39,11 @@ pub fn write(manifest: &Manifest<'_>, contents: &[&[u32]; SECTION_COUNT], out: &
     let mut manifest = manifest.clone();
     manifest.sections.clear();
     let mut end = 0usize;
-    for (kind, words) in SectionKind::ALL.into_iter().zip(contents) {
+    let present = || {
+        let all = SectionKind::ALL.into_iter().zip(contents);
+        all.filter(|(kind, words)| !(kind.is_optional() && words.is_empty()))
+    };
+    for (kind, words) in present() {
         let offset = end.next_multiple_of(ALIGNMENT);
         let section = Section { kind, offset: offset as u32, length: 4 * words.len() as u32 };
         manifest.sections.push(section).map_err(|_| WriteError::Full)?;
@@ -52,7 +56,7 @@ pub fn write(manifest: &Manifest<'_>, contents: &[&[u32]; SECTION_COUNT], out: &
     let manifest_padded = manifest_length.next_multiple_of(ALIGNMENT);
     let payload = payload.get_mut(..manifest_padded + end).ok_or(WriteError::Full)?;
     let (_, body) = payload.split_at_mut_checked(manifest_padded).ok_or(WriteError::Full)?;
-    for (section, words) in manifest.sections.iter().zip(contents) {
+    for (section, (_, words)) in manifest.sections.iter().zip(present()) {
         let bytes = body.get_mut(section.offset as usize..).unwrap_or_default();
         for (out, word) in bytes.chunks_exact_mut(4).zip(*words) {
             out.copy_from_slice(&word.to_le_bytes());

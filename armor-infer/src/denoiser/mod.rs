@@ -76,7 +76,7 @@ fn kappa_embedding<'m>(policy: &Policy<'_>, kappa: Cost, first: &'m mut [f32], s
     let [layer_1, layer_2, layer_3] = &policy.sections.kappa;
     let kernel = policy.kernel;
     let hidden = front(first, k);
-    affine(kernel, layer_1, &[policy.kappa.scale * kappa.to_f32()], hidden);
+    affine(kernel, layer_1, &[policy.kappa.scale * policy.condition(kappa)], hidden);
     kernel.mish(hidden);
     let second = front(second, k);
     affine(kernel, layer_2, hidden, second);

@@ -237,6 +237,26 @@ impl Actor {
         self.denoiser.finish(parameters, &batch.state, &mut tape.context, gradient);
     }
 
+    /// The gradient of `L_BC` (Eq. 13) alone, added to `gradient`, for noise levels `[B]` and noise
+    /// `A x B`; the mean is over `batch_len` samples, of which `batch` is a share. Returns the summed loss.
+    ///
+    /// The embedding sees what the batch says the actor is conditioned on.
+    pub fn imitate<T: Scalar>(
+        &self,
+        parameters: &[T],
+        (batch, batch_len): (&Batch<T>, usize),
+        noise: (&[usize], &DMatrix<T>),
+        tape: &mut ActorTape<T>,
+        gradient: &mut [T],
+    ) -> f64 {
+        let share = T::of(1.0 / batch_len as f64);
+        self.denoiser.prepare(parameters, &batch.state, &batch.condition, &mut tape.context);
+        let loss = self.clone_behaviour(parameters, batch, share, noise, tape);
+        self.denoiser.backward(parameters, &mut tape.context, &mut tape.call, gradient);
+        self.denoiser.finish(parameters, &batch.state, &mut tape.context, gradient);
+        loss
+    }
+
     /// Eqs. 11 and 13: noises the recorded actions, predicts the noise, and sets
     /// the gradient of `L_BC` with respect to the prediction. A Gaussian predicts the
     /// recorded action itself, and sees the noise alone. Returns the summed loss.

@@ -6,14 +6,19 @@ use std::path::PathBuf;
 use armor_core::image::PolicyImage;
 use armor_core::units::CostLimit;
 use firmware_sim::cli::output::{CommandResult, Output};
-use firmware_sim::flight::{FlightPlan, fly};
+use firmware_sim::flight::FlightPlan;
 use firmware_sim::summary::FlightSummary;
 use firmware_sim::task::Task;
 use serde::Serialize;
 
+use super::flyer::Flyer;
+
 /// Fly a policy on a task and report normalised reward and cost (Eq. 17).
 ///
-/// What flies is the image that would be deployed, on the same controller.
+/// What flies is the image that would be deployed, on the same controller. A
+/// task of a simulator is flown there, over the link; the simulators are
+/// installed on first use, in a folder of the user's cache or in the one that
+/// ARMOR_SIMULATORS names.
 #[derive(Debug, clap::Args)]
 pub(super) struct Evaluate {
     /// Folder of a run, or an image.
@@ -48,10 +53,10 @@ struct Report {
 impl Evaluate {
     pub(super) fn run(self, output: Output) -> CommandResult {
         let task = self.task;
-        task.plant()?;
         let bytes = super::run_folder::image(&self.policy, self.data.as_ref(), output)?;
         let image = PolicyImage::new_checked(bytes.as_slice())
             .map_err(|error| format!("{}: {error}", self.policy.display()))?;
+        let flyer = Flyer::of(task, output)?;
         let limits = if self.limit.is_empty() { vec![CostLimit::new(task.cost_limit)?] } else { self.limit };
         let mut flights = Vec::new();
         for limit in limits {
@@ -63,7 +68,7 @@ impl Evaluate {
                 rate_hz: task.rate_hz,
                 max_steps: self.max_steps,
             };
-            flights.push(fly(&image, &plan)?.summary);
+            flights.push(flyer.fly(&image, &plan, output)?.summary);
         }
         output.report(&Report { policy: self.policy, flights })
     }

@@ -1,9 +1,11 @@
 //! The command line: `armor-train COMMAND`.
 
+mod calibrate;
 mod data;
 mod evaluate;
 mod export;
 mod fit;
+mod flyer;
 mod options;
 mod progress;
 mod quickstart;
@@ -36,6 +38,7 @@ enum Command {
     Data(data::Data),
     Fit(fit::Fit),
     Options(options::Options),
+    Calibrate(calibrate::Calibrate),
     Export(export::Export),
     Evaluate(evaluate::Evaluate),
     Report(report::Report),
@@ -51,6 +54,7 @@ pub fn main() -> ExitCode {
         Command::Data(command) => command.run(output),
         Command::Fit(command) => command.run(output),
         Command::Options(command) => command.run(output),
+        Command::Calibrate(command) => command.run(output),
         Command::Export(command) => command.run(output),
         Command::Evaluate(command) => command.run(output),
         Command::Report(command) => command.run(output),

@@ -140,7 +140,7 @@ impl Quickstart {
         let train_seconds = started.elapsed().as_secs_f64();
 
         let checkpoint = Checkpoint::read(&folder)?;
-        let exported = export(&checkpoint, data)?;
+        let exported = export(&checkpoint, data, None)?;
         let (image, chip) = (folder.join("policy.armor"), folder.join("chip.bin"));
         file::write(&image, exported.bytes.as_slice())?;
         let booted = flash_and_boot(exported.bytes.as_slice(), &chip)?;

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use firmware_sim::cli::output::Output;
 use firmware_sim::memory::AlignedBytes;
 
+use crate::calibrate::Knots;
 use crate::data::Dataset;
 use crate::export::{Exported, export};
 use crate::run::{Checkpoint, RunError};
@@ -16,13 +17,23 @@ pub(super) fn export_folder(
     data: Option<&PathBuf>,
     output: Output,
 ) -> Result<(Checkpoint, Dataset, Exported), Box<dyn std::error::Error>> {
+    let (checkpoint, data) = checkpoint_and_data(folder, data, output)?;
+    let exported = export(&checkpoint, &data, Knots::read(folder)?.as_ref())?;
+    Ok((checkpoint, data, exported))
+}
+
+/// The last checkpoint in `folder`, and the data that the run learns from.
+pub(super) fn checkpoint_and_data(
+    folder: &Path,
+    data: Option<&PathBuf>,
+    output: Output,
+) -> Result<(Checkpoint, Dataset), Box<dyn std::error::Error>> {
     let checkpoint = Checkpoint::read(folder)?;
     let path = data.cloned().unwrap_or_else(|| PathBuf::from(&checkpoint.config.data));
     let data = super::data::read(&path, output)
         .map_err(|error| format!("{error}; name the run's recorded data with --data if it was moved"))?;
     same_data(&checkpoint, &data, folder)?;
-    let exported = export(&checkpoint, &data)?;
-    Ok((checkpoint, data, exported))
+    Ok((checkpoint, data))
 }
 
 fn same_data(checkpoint: &Checkpoint, data: &Dataset, folder: &Path) -> Result<(), RunError> {

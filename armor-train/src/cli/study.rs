@@ -7,11 +7,12 @@ use armor_core::image::PolicyImage;
 use armor_core::units::CostLimit;
 use firmware_sim::cli::output::{CommandResult, Output};
 use firmware_sim::file;
-use firmware_sim::flight::{FlightPlan, fly};
+use firmware_sim::flight::FlightPlan;
 use firmware_sim::task::Task;
 use serde::Serialize;
 
 use super::fit::{absolute, train};
+use super::flyer::Flyer;
 use crate::data::Dataset;
 use crate::export::export;
 use crate::run::{Checkpoint, METRICS_FILE, Outcome, Table};
@@ -64,10 +65,11 @@ impl Study {
         let study = Definition::parse(&file, &text)?;
         let runs = study.runs(&absolute(&self.data))?;
         let data = super::data::read(&self.data, output)?;
+        let flyer = Flyer::of(Task::named(&study.task)?, output)?;
         let mut rows: Vec<Row> = Vec::new();
         for (index, run) in runs.iter().enumerate() {
             let label = format!("{}/{} {}", index + 1, runs.len(), run.folder.display());
-            let score = self.score(&study, run, &label, &data, output)?;
+            let score = self.score((&study, &flyer), run, &label, &data, output)?;
             match rows.last_mut().filter(|row| row.variant == run.variant) {
                 Some(row) => row.scores.push(score),
                 None => rows.push(Row { variant: run.variant.clone(), scores: vec![score] }),
@@ -98,7 +100,7 @@ impl Study {
     /// Trains, exports and flies a run, unless that is done already.
     fn score(
         &self,
-        study: &Definition,
+        (study, flyer): (&Definition, &Flyer),
         run: &Run,
         label: &str,
         data: &Dataset,
@@ -114,10 +116,10 @@ impl Study {
         if let Outcome::Stopped(step) = train(label, &run.config, data, &folder, resume, output)? {
             return Err(format!("stopped and saved {label} at step {step}; the same command goes on").into());
         }
-        let exported = export(&Checkpoint::read(&folder)?, data)?;
+        let exported = export(&Checkpoint::read(&folder)?, data, None)?;
         let score = Score {
             of,
-            flights: fly_all(study, run, exported.bytes.as_slice())?,
+            flights: fly_all((study, flyer), run, exported.bytes.as_slice(), output)?,
             columns: last_row(&folder, &study.columns)?,
         };
         score.write(&folder)?;
@@ -132,14 +134,19 @@ impl Study {
 }
 
 /// A flight for each of the study's `max_steps`.
-fn fly_all(study: &Definition, run: &Run, bytes: &[u8]) -> Result<Vec<Flown>, Box<dyn std::error::Error>> {
+fn fly_all(
+    (study, flyer): (&Definition, &Flyer),
+    run: &Run,
+    bytes: &[u8],
+    output: Output,
+) -> Result<Vec<Flown>, Box<dyn std::error::Error>> {
     let image = PolicyImage::new_checked(bytes)?;
     let task = Task::named(&study.task)?;
     let limit = CostLimit::new(run.config.limit as f32)?;
     let flights = study.max_steps.iter().map(|&max_steps| {
         let (episodes, seed) = (study.episodes, run.config.seed);
         let plan = FlightPlan { task, limit, episodes, seed, rate_hz: task.rate_hz, max_steps };
-        Ok(Flown::new(max_steps, &fly(&image, &plan)?.summary))
+        Ok(Flown::new(max_steps, &flyer.fly(&image, &plan, output)?.summary))
     });
     flights.collect()
 }

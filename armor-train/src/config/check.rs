@@ -4,6 +4,9 @@ use armor_core::schedule::MAX_STEPS;
 
 use super::{Config, ConfigError};
 use crate::actor::{Family, PolicyGradient};
+use crate::critic::bootstrap::Bootstrap;
+use crate::extraction::Extraction;
+use crate::extraction::condition::Condition;
 
 impl Config {
     /// Whether every option lies in its range.
@@ -31,6 +34,8 @@ impl Config {
             ("actor_rate", self.actor_rate),
             ("critic_rate", self.critic_rate),
             ("dual_rate", self.dual_rate),
+            ("lambda_min", self.lambda_min),
+            ("lambda_max", self.lambda_max),
         ];
         for (key, value) in positive {
             require(key, value.is_finite() && value > 0.0, "a positive number")?;
@@ -56,11 +61,24 @@ impl Config {
             ("temperature", self.temperature),
             ("gaussian_std", self.gaussian_std),
             ("gradient_clip", self.gradient_clip),
+            ("advantage_temperature", self.advantage_temperature),
+            ("advantage_lambda", self.advantage_lambda),
+            ("advantage_cap", self.advantage_cap),
             ("counterfactual_tolerance", self.counterfactual_tolerance),
         ];
         for (key, value) in not_negative {
             require(key, value.is_finite() && value >= 0.0, "a number of at least 0")?;
         }
+        for (key, value) in [("reward_expectile", self.reward_expectile), ("cost_expectile", self.cost_expectile)] {
+            require(key, value > 0.0 && value < 1.0, "above 0 and below 1")?;
+        }
+        let (in_sample, weighted) = (self.bootstrap == Bootstrap::InSample, self.extraction == Extraction::Weighted);
+        require("critic_steps", in_sample || self.critic_steps == 0, "0 unless bootstrap is in_sample")?;
+        require("critic_steps", self.critic_steps == 0 || self.critic_steps < self.steps, "below steps")?;
+        let by_kappa = self.condition == Condition::Kappa;
+        require("condition", weighted || by_kappa, "kappa unless extraction is weighted")?;
+        require("lambda_max", self.lambda_min <= self.lambda_max, "at least lambda_min")?;
+        require("critic_steps", !weighted || self.critic_steps >= 1, "at least 1 where extraction is weighted")?;
         require("actor_average", (0.0..1.0).contains(&self.actor_average), "from 0 to below 1")?;
         require("feasible_mass", (0.0..1.0).contains(&self.feasible_mass), "from 0 to below 1")?;
         require("dual_normalize", !self.dual_normalize || self.limit > 0.0, "false where the limit is 0")?;
@@ -104,6 +122,26 @@ fn require(key: &'static str, holds: bool, range: &'static str) -> Result<(), Co
 #[cfg(test)]
 mod tests {
     use crate::config::Preset;
+
+    #[test]
+    fn critics_come_first_only_where_they_need_no_actor() {
+        let faults = |assignments: &[&str]| {
+            let mut config = Preset::Quick.config("ball-run", 5.0);
+            assignments.iter().for_each(|assignment| config.set(assignment).unwrap());
+            config.check().err().map(|error| error.to_string())
+        };
+        let sound = ["bootstrap=in_sample", "extraction=weighted", "critic_steps=100"];
+        assert_eq!(faults(&sound), None);
+        assert_eq!(faults(&sound[..1]), None);
+        let unless = "option `critic_steps` must be 0 unless bootstrap is in_sample";
+        assert_eq!(faults(&sound[2..]).as_deref(), Some(unless));
+        let weighted = "option `critic_steps` must be at least 1 where extraction is weighted";
+        assert_eq!(faults(&sound[..2]).as_deref(), Some(weighted));
+        let only = "option `condition` must be kappa unless extraction is weighted";
+        assert_eq!(faults(&["condition=lambda"]).as_deref(), Some(only));
+        let below = "option `critic_steps` must be below steps";
+        assert_eq!(faults(&["bootstrap=in_sample", "critic_steps=9000"]).as_deref(), Some(below));
+    }
 
     #[test]
     fn an_option_out_of_range_is_named() {

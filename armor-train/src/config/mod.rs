@@ -12,8 +12,11 @@ use armor_core::schedule::{Noising, Sampler};
 use serde::{Deserialize, Serialize};
 
 use crate::actor::{CloningNorm, Family, Guidance, PolicyGradient, ReverseVariance};
+use crate::critic::bootstrap::Bootstrap;
 use crate::critic::{CostHeads, CostOutput, Trunk, TwinLoss};
 use crate::dual::DualClip;
+use crate::extraction::Extraction;
+use crate::extraction::condition::{Condition, LambdaRange};
 use crate::pcgrad::{Order, Pooling};
 use crate::reweight::reference::Reference;
 use crate::threshold::Threshold;
@@ -123,6 +126,33 @@ pub struct Config {
     /// Steps of that sampler, at most `diffusion_steps`.
     pub target_steps: usize,
 
+    /// What the critics' targets bootstrap from (Eq. 3).
+    pub bootstrap: Bootstrap,
+    /// Whether the critics see kappa; they do in the paper. Recorded data meet
+    /// every budget by construction, so a critic that sees kappa finds nearly all of it feasible.
+    pub critic_sees_kappa: bool,
+    /// Expectile of the state values of reward.
+    pub reward_expectile: f64,
+    /// Expectile of the state values of cost; below 0.5 leans towards the cheapest action.
+    pub cost_expectile: f64,
+    /// Training steps of the critics alone, which are frozen then while the
+    /// actor learns for the rest; 0, both at once, in the paper.
+    pub critic_steps: u64,
+    /// How the actor takes up what the critics know (Eqs. 13 to 15).
+    pub extraction: Extraction,
+    /// Inverse temperature alpha of advantage weights.
+    pub advantage_temperature: f64,
+    /// Price lambda of cost in advantage weights, in units of scaled advantages.
+    pub advantage_lambda: f64,
+    /// Largest logarithm of an advantage weight.
+    pub advantage_cap: f64,
+    /// What the actor is conditioned on; kappa in the paper.
+    pub condition: Condition,
+    /// Smallest price of cost that an actor conditioned on it is trained for.
+    pub lambda_min: f64,
+    /// Largest such price.
+    pub lambda_max: f64,
+
     /// Share of samples whose kappa is relabelled with a larger budget; 0 in the
     /// paper. Recorded kappa always ends at 0, so a clone learns to spend it all.
     pub relabel_share: f64,
@@ -177,6 +207,22 @@ pub struct Config {
     pub weight_min: f64,
     /// Largest weight, `w_max` (Eqs. 9 and 10, Table 2).
     pub weight_max: f64,
+}
+
+impl Config {
+    /// The factor on what the actor is conditioned on, where that enters its embedding, in units of scaled
+    /// cost for kappa; a leniency lies within 0 and 1 already.
+    pub const fn condition_scale(&self) -> f64 {
+        match self.condition {
+            Condition::Kappa => self.kappa_scale,
+            Condition::Lambda | Condition::None => 1.0,
+        }
+    }
+
+    /// The prices of cost that an actor conditioned on them is trained for.
+    pub const fn lambda_range(&self) -> LambdaRange {
+        LambdaRange { min: self.lambda_min, max: self.lambda_max }
+    }
 }
 
 /// Why a configuration cannot be used.

@@ -9,7 +9,7 @@ pub type Entry = (&'static str, &'static str);
 
 /// All options, by what they are about. `O-n` are the choices that the paper
 /// leaves open; the meaning says what was chosen and why.
-pub const OPTIONS: [(&str, &[Entry]); 5] = [
+pub const OPTIONS: [(&str, &[Entry]); 6] = [
     (
         "Run",
         &[
@@ -153,6 +153,44 @@ pub const OPTIONS: [(&str, &[Entry]); 5] = [
                 "actor_average",
                 "decay of a moving average of the actor's weights, which is exported in their place; 0 is none (O-10)",
             ),
+        ],
+    ),
+    (
+        "In-sample learning",
+        &[
+            (
+                "bootstrap",
+                "what the critics' targets bootstrap from: `policy`, the target critic at an action of the policy (Eq. 3), or `in_sample`, state values learnt by expectile regression at recorded actions alone, so that no value of an action that the data lacks is ever asked",
+            ),
+            (
+                "critic_sees_kappa",
+                "whether the critics see kappa; recorded data meet every budget by construction, so a critic that sees kappa finds nearly all of it feasible",
+            ),
+            (
+                "reward_expectile",
+                "expectile of the state values of reward; 0.5 is the mean, above it leans towards the best action",
+            ),
+            (
+                "cost_expectile",
+                "expectile of the state values of cost; 0.5 is the mean, below it leans towards the cheapest action",
+            ),
+            (
+                "critic_steps",
+                "training steps of the critics alone; they are frozen then, and the actor learns for the rest; 0 trains both at once, which only bootstrap = policy needs",
+            ),
+            (
+                "extraction",
+                "how the actor takes up what the critics know: `guidance`, by their gradient at its actions (Eq. 15), or `weighted`, by cloning each recorded action with weight exp(min(cap, alpha (A_r - lambda A_cL))), A the advantage divided by its mean size over the data, times w of Eq. 10, divided by its mean over the batch",
+            ),
+            ("advantage_temperature", "inverse temperature alpha of those weights"),
+            ("advantage_lambda", "price lambda of cost in those weights"),
+            ("advantage_cap", "largest logarithm of those weights"),
+            (
+                "condition",
+                "what the actor is conditioned on, beside the state: `kappa` (the paper), `lambda`, the price of cost in its weights, drawn log-uniformly for each sample, to which the command calibrate maps the remaining budget, or `none`; the last two need weighted extraction",
+            ),
+            ("lambda_min", "smallest price that is drawn"),
+            ("lambda_max", "largest price that is drawn"),
         ],
     ),
     (

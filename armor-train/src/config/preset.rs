@@ -5,8 +5,11 @@ use serde::{Deserialize, Serialize};
 
 use super::Config;
 use crate::actor::{CloningNorm, Family, Guidance, PolicyGradient, ReverseVariance};
+use crate::critic::bootstrap::Bootstrap;
 use crate::critic::{CostHeads, CostOutput, Trunk, TwinLoss};
 use crate::dual::DualClip;
+use crate::extraction::Extraction;
+use crate::extraction::condition::Condition;
 use crate::pcgrad::{Order, Pooling};
 use crate::reweight::reference::Reference;
 use crate::threshold::Threshold;
@@ -81,6 +84,18 @@ impl Preset {
             gradient_steps: 3,
             target_sampler: Sampler::Ddpm,
             target_steps: 20,
+            bootstrap: Bootstrap::Policy,
+            critic_sees_kappa: true,
+            reward_expectile: 0.7,
+            cost_expectile: 0.5,
+            critic_steps: 0,
+            extraction: Extraction::Guidance,
+            advantage_temperature: 2.0,
+            advantage_lambda: 2.0,
+            advantage_cap: 3.0,
+            condition: Condition::Kappa,
+            lambda_min: 0.5,
+            lambda_max: 4.0,
             relabel_share: 0.0,
             threshold: Threshold::Kappa,
             dual_slack: 0.0,

@@ -1,5 +1,6 @@
 //! How far the image's actions are from the trainer's.
 
+use armor_core::budget_map::BudgetMap;
 use armor_core::noise::{Noise, below};
 use armor_core::schedule::Sampler;
 use armor_core::units::{Cost, CostLimit};
@@ -52,7 +53,7 @@ impl Agreement {
 pub fn agreement(
     (actor, parameters, cost_scale): (&Actor, &[f32], f64),
     normaliser: &Normaliser,
-    policy: Policy<'_>,
+    (policy, map): (Policy<'_>, Option<BudgetMap<'_>>),
     data: &Dataset,
 ) -> Result<Agreement, ExportError> {
     let rows: Vec<usize> = (0..AGREEMENT_SAMPLES)
@@ -63,9 +64,13 @@ pub fn agreement(
 
     let state: Vec<f32> = rows.iter().flat_map(|&row| normaliser.apply(data.observation(row))).collect();
     let state = DMatrix::from_vec(data.state_dim(), rows.len(), state);
-    let kappa: Vec<f32> = kappas.iter().map(|kappa| (f64::from(kappa.to_f32()) * cost_scale) as f32).collect();
+    let condition = |kappa: &Cost| match map {
+        Some(map) => map.condition(*kappa),
+        None => (f64::from(kappa.to_f32()) * cost_scale) as f32,
+    };
+    let condition: Vec<f32> = kappas.iter().map(condition).collect();
     let mut context = actor.denoiser.context(rows.len());
-    actor.denoiser.prepare(parameters, &state, &kappa, &mut context);
+    actor.denoiser.prepare(parameters, &state, &condition, &mut context);
     let steps = actor.process.chain(Sampler::Ddpm, actor.process.schedule.steps);
     let mut chain = Chain::new(&actor.denoiser, steps, rows.len(), 0);
     chain.run(&actor.denoiser, parameters, &context, &|stage, sample, out: &mut [f32]| {

@@ -16,8 +16,10 @@ use super::agreement::{AGREEMENT_BOUND, Agreement, agreement};
 use super::sections::sections;
 use super::{ExportError, ImageBytes, golden};
 use crate::actor::Actor;
+use crate::calibrate::Knots;
 use crate::config::Config;
 use crate::data::Dataset;
+use crate::extraction::condition::Condition;
 use crate::model::Model;
 use crate::normaliser::Normaliser;
 use crate::run::Checkpoint;
@@ -38,31 +40,38 @@ pub struct Exported {
     pub agreement: Agreement,
 }
 
-/// The image of a checkpoint's actor in f32.
+/// The image of a checkpoint's actor in f32, with `map` from the remaining
+/// budget where the actor is conditioned on the price of cost.
 ///
 /// # Errors
 /// [`ExportError`]
-pub fn export(checkpoint: &Checkpoint, data: &Dataset) -> Result<Exported, ExportError> {
+pub fn export(checkpoint: &Checkpoint, data: &Dataset, map: Option<&Knots>) -> Result<Exported, ExportError> {
     let config = &checkpoint.config;
+    let budget_map = match config.condition {
+        Condition::Kappa => Vec::new(),
+        Condition::Lambda => map.ok_or(ExportError::NotCalibrated)?.words(),
+        Condition::None => Knots::constant(0.0).words(),
+    };
     let actor = Model::new(config, data.state_dim(), data.action_dim()).actor;
     let parameters = checkpoint.state.flying_actor();
     let normaliser = Normaliser::new(data, config.normalize_states);
     let manifest = manifest(checkpoint, &actor, data);
 
     // A trace without rows, to have an image that the controller can fly.
-    let draft = build(&manifest, &sections(&actor, parameters, &normaliser, &manifest.rungs, &[0; 4]))?;
+    let draft = build(&manifest, &sections(&actor, parameters, &normaliser, &manifest.rungs, [&[0; 4], &budget_map]))?;
     let image = PolicyImage::new_checked(draft.as_slice()).map_err(armor_core::image::WriteError::Invalid)?;
     let policy = Policy::load(&image)?;
     let limit = flyable_limit(config, &manifest);
     let trace = golden::record(policy, data, limit, config.seed)?;
-    let agreement = agreement((&actor, parameters, config.cost_scale), &normaliser, policy, data)?;
+    let agreement =
+        agreement((&actor, parameters, config.cost_scale), &normaliser, (policy, image.sections().budget_map), data)?;
     if agreement.agreement_max_abs > AGREEMENT_BOUND {
         return Err(ExportError::Disagreement { found: agreement.agreement_max_abs });
     }
 
     let quality = quality(&image, limit, config.seed)?;
     let manifest = Manifest { agreement_max_abs: agreement.agreement_max_abs, quality, ..manifest };
-    let bytes = build(&manifest, &sections(&actor, parameters, &normaliser, &manifest.rungs, &trace))?;
+    let bytes = build(&manifest, &sections(&actor, parameters, &normaliser, &manifest.rungs, [&trace, &budget_map]))?;
     Ok(Exported { bytes, agreement })
 }
 
@@ -119,7 +128,11 @@ fn manifest<'a>(checkpoint: &'a Checkpoint, actor: &Actor, data: &Dataset) -> Ma
         shape,
         precision: Precision::F32,
         kappa: KappaRange {
-            scale: (config.cost_scale * config.kappa_scale) as f32,
+            scale: match config.condition {
+                // The trainer scales costs before they enter a network.
+                Condition::Kappa => (config.cost_scale * config.kappa_scale) as f32,
+                Condition::Lambda | Condition::None => config.condition_scale() as f32,
+            },
             trained_max: Cost::from_incurred(data.max_kappa()).unwrap_or(Cost::MAX),
         },
         schedule: actor.process.schedule,

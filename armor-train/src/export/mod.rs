@@ -50,6 +50,11 @@ pub enum ExportError {
     /// A number of the network is too large for its place in an integer image.
     #[error("the weights of {0:?} are too large for integers; export the policy as f32")]
     Range(SectionKind),
+    /// The actor is conditioned on the price of cost, and nothing says which price a budget asks for.
+    #[error(
+        "the policy is conditioned on the price of cost and has no map from the budget to it yet; run `armor-train calibrate` on the run's folder first"
+    )]
+    NotCalibrated,
     /// The data has no trajectory.
     #[error("the data has no trajectory to take a golden trace from")]
     NoTrajectory,

@@ -9,13 +9,14 @@ use crate::actor::Actor;
 use crate::nn::Linear;
 use crate::normaliser::Normaliser;
 
-/// The sections of a policy in the order of [`SectionKind::ALL`]; the golden trace is `golden`.
+/// The sections of a policy in the order of [`SectionKind::ALL`]; the golden trace is `golden`,
+/// the knots of a budget map `map`, empty where there is none.
 pub(super) fn sections(
     actor: &Actor,
     parameters: &[f32],
     normaliser: &Normaliser,
     rungs: &[Rung],
-    golden: &[u32],
+    [golden, map]: [&[u32]; 2],
 ) -> [Vec<u32>; SECTION_COUNT] {
     let denoiser = &actor.denoiser;
     let widths = denoiser.widths();
@@ -47,6 +48,7 @@ pub(super) fn sections(
             rungs.iter().flat_map(chain).flat_map(|step| step.to_f32().to_words()).collect()
         }
         SectionKind::Golden => golden.to_vec(),
+        SectionKind::BudgetMap => map.to_vec(),
     })
 }
 

@@ -5,6 +5,7 @@ use armor_core::fixed::LOWEST;
 use armor_core::image::{Dense, FloatNetwork, Network, PolicyImage};
 use armor_core::mish::mish;
 use armor_core::noise::{Noise, below};
+use armor_core::units::Cost;
 use nalgebra::DMatrix;
 
 use crate::data::Dataset;
@@ -90,7 +91,10 @@ fn context(image: &PolicyImage<'_>, network: &FloatNetwork<'_>, data: &Dataset) 
         (value - numbers.state_mean[entry]) * numbers.state_factor[entry]
     });
     let scale = image.manifest().kappa.scale;
-    let kappa = DMatrix::from_fn(1, SAMPLES, |_, sample| scale * data.kappa(rows[sample]));
+    let kappa = DMatrix::from_fn(1, SAMPLES, |_, sample| {
+        let kappa = Cost::from_incurred(data.kappa(rows[sample])).unwrap_or(Cost::MAX);
+        scale * numbers.budget_map.map_or(kappa.to_f32(), |map| map.condition(kappa))
+    });
     let [one, two, three] = &numbers.kappa;
     let hidden = affine(two, &affine(one, &kappa).map(mish)).map(mish);
     let embedding = affine(three, &hidden);

@@ -14,10 +14,16 @@ pub(super) struct Section<'a> {
 /// All charts of a run.
 pub(super) fn sections(run: &RunFolder) -> Vec<Section<'_>> {
     vec![
-        Section { title: "Critic", charts: vec![critic_losses(run), reward_values(run), cost_values(run)] },
+        Section {
+            title: "Critic",
+            charts: vec![critic_losses(run), value_losses(run), reward_values(run), cost_values(run)],
+        },
         Section { title: "Gradient surgery", charts: vec![conflicts(run), trunk_norms(run)] },
         Section { title: "Actor and dual", charts: vec![cloning(run), lambda(run), penalty(run), norms(run)] },
-        Section { title: "Reweighting", charts: vec![weights(run), active(run)] },
+        Section {
+            title: "Reweighting",
+            charts: vec![weights(run), active(run), batch_weights(run), advantage_scales(run)],
+        },
         Section { title: "Speed", charts: vec![speed(run)] },
     ]
 }
@@ -48,6 +54,19 @@ fn critic_losses(run: &RunFolder) -> Chart<'_> {
         layers: lines(run, &columns),
         caption: "Squared error of the twins' values (Eq. 4). Losses grow with the values they fit.".to_owned(),
         ..chart(run, "Critic losses", "scaled reward or cost, squared", Scale::Log)
+    }
+}
+
+fn value_losses(run: &RunFolder) -> Chart<'_> {
+    let columns = [
+        ("value_loss_reward", "reward"),
+        ("value_loss_long_cost", "long-term cost"),
+        ("value_loss_short_cost", "short-term cost"),
+    ];
+    Chart {
+        layers: lines(run, &columns),
+        caption: "Expectile loss of the state values, where targets bootstrap from them.".to_owned(),
+        ..chart(run, "State-value losses", "scaled reward or cost, squared", Scale::Log)
     }
 }
 
@@ -189,6 +208,25 @@ fn active(run: &RunFolder) -> Chart<'_> {
         layers: lines(run, &[("counterfactual_active", "active")]),
         caption: "Transitions with a counterfactual weight above 1 (Eq. 9).".to_owned(),
         ..chart(run, "Active counterfactual weights", "share of transitions", Scale::Linear)
+    }
+}
+
+fn batch_weights(run: &RunFolder) -> Chart<'_> {
+    let columns = [("advantage_weight_mean", "mean weight"), ("advantage_weight_effective", "effective share")];
+    Chart {
+        layers: lines(run, &columns),
+        caption: "Advantage weights of a batch: their mean before it is divided out, and the share of the batch that they leave effective."
+            .to_owned(),
+        ..chart(run, "Advantage weights", "weight, share of the batch", Scale::Log)
+    }
+}
+
+fn advantage_scales(run: &RunFolder) -> Chart<'_> {
+    let columns = [("advantage_scale_reward", "reward"), ("advantage_scale_cost", "long-term cost")];
+    Chart {
+        layers: lines(run, &columns),
+        caption: "Mean size of the advantages over the data: what one unit of a scaled advantage is.".to_owned(),
+        ..chart(run, "Advantage scales", "scaled reward or cost", Scale::Log)
     }
 }
 

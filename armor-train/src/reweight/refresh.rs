@@ -31,7 +31,11 @@ impl Reweighting {
     /// All weights 1.
     pub fn new(config: &Config, data: &Dataset) -> Self {
         Self {
-            refresh: Refresh { warmup: config.reweight_warmup, interval: config.reweight_interval },
+            // While the critics train alone nobody is weighed.
+            refresh: Refresh {
+                warmup: config.reweight_warmup.max(config.critic_steps),
+                interval: config.reweight_interval,
+            },
             counterfactual: Counterfactual {
                 perturbations: config.perturbations,
                 sigma: sigma(config, data),

@@ -81,10 +81,12 @@ impl Cause {
     /// What to try; names of options stand in backticks.
     pub const fn remedy(self) -> &'static str {
         match self {
-            Self::RewardCritic => "a smaller `critic_rate` or `target_rate`, or a smaller `eta`",
-            Self::CostCritic => "a smaller `critic_rate` or `target_rate`, or a smaller `long_cost_discount`",
+            Self::RewardCritic => "a smaller `critic_rate` or `target_rate`, a smaller `eta`, or `bootstrap` in_sample",
+            Self::CostCritic => {
+                "a smaller `critic_rate` or `target_rate`, a smaller `long_cost_discount`, or `bootstrap` in_sample"
+            }
             Self::LambdaCap => {
-                "a larger `dual_slack` or a smaller `dual_rate`, or a `kappa_scale` of 1 over the cost limit so that the dual network can tell budgets apart"
+                "a larger `dual_slack` or a smaller `dual_rate`, or a `kappa_scale` of 1 over the cost limit so that the dual network can tell budgets apart, or `extraction` weighted, which needs no dual"
             }
             Self::DeadWeights => {
                 "a larger `sigma`, or a larger `short_cost_discount` so that Q_cS can exceed a whole unit of cost"
@@ -140,7 +142,7 @@ impl Alarms {
         let cost = provenance.cost_to_go.largest().max(config.cost_scale);
         Self {
             largest: [reward, cost],
-            two_refreshes: config.reweight_warmup.saturating_add(config.reweight_interval),
+            two_refreshes: config.reweight_warmup.max(config.critic_steps).saturating_add(config.reweight_interval),
             limit: config.limit,
             max_kappa: provenance.max_kappa,
             cap: config.log_lambda_max.exp(),

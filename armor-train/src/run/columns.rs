@@ -40,6 +40,14 @@ pub const COLUMNS: &[Column] = &[
         r.critic_loss[2]
     }),
     column(
+        "value_loss_reward",
+        "scaled reward squared",
+        "expectile loss of the state values of reward; 0 where targets bootstrap from the policy, as the next two",
+        |r| r.value_loss[0],
+    ),
+    column("value_loss_long_cost", "scaled cost squared", "the same of long-term cost", |r| r.value_loss[1]),
+    column("value_loss_short_cost", "scaled cost squared", "the same of short-term cost", |r| r.value_loss[2]),
+    column(
         "conflicts_0",
         SHARE,
         "steps without a pair of trunk gradients in conflict; the paper has .50 (Table A1)",
@@ -54,22 +62,23 @@ pub const COLUMNS: &[Column] = &[
         "weighted behaviour cloning (Eq. 13); a net that predicts no noise at all has the number of action entries",
         |r| r.cloning,
     ),
-    column("q_reward_min", REWARD, "smallest Q_r at the policy's actions, over all batches of the row", |r| {
-        r.q_reward[0]
-    }),
-    column("q_reward", REWARD, "mean Q_r at the policy's actions", |r| r.q_reward[1]),
-    column("q_reward_max", REWARD, "largest Q_r at the policy's actions", |r| r.q_reward[2]),
-    column("q_long_cost_min", COST, "smallest Q_cL at the policy's actions, over all batches of the row", |r| {
-        r.q_long_cost[0]
-    }),
-    column("q_long_cost", COST, "mean Q_cL at the policy's actions", |r| r.q_long_cost[1]),
-    column("q_long_cost_max", COST, "largest Q_cL at the policy's actions", |r| r.q_long_cost[2]),
+    column(
+        "q_reward_min",
+        REWARD,
+        "smallest Q_r over all batches of the row, at the policy's actions, or at the recorded ones where the critics train alone; 0 where no critic is asked, as all q columns",
+        |r| r.q_reward[0],
+    ),
+    column("q_reward", REWARD, "mean Q_r", |r| r.q_reward[1]),
+    column("q_reward_max", REWARD, "largest Q_r", |r| r.q_reward[2]),
+    column("q_long_cost_min", COST, "smallest Q_cL at the same actions", |r| r.q_long_cost[0]),
+    column("q_long_cost", COST, "mean Q_cL", |r| r.q_long_cost[1]),
+    column("q_long_cost_max", COST, "largest Q_cL", |r| r.q_long_cost[2]),
     column("lambda", LAMBDA, "mean dual variable at the budgets of the batch", |r| r.lambda),
     column("penalty", REWARD, "mean lambda (Q_cL - kappa) (Eq. 15)", |r| r.penalty),
     column(
         "lambda_kappa_0",
         LAMBDA,
-        "lambda where no budget is left; at the row's last step, as all lambda_kappa",
+        "lambda where no budget is left; at the row's last step, as all lambda_kappa; 0 where no dual learns",
         |r| r.lambda_by_kappa[0],
     ),
     column("lambda_kappa_half", LAMBDA, "lambda at half the cost limit", |r| r.lambda_by_kappa[1]),
@@ -105,6 +114,24 @@ pub const COLUMNS: &[Column] = &[
     column("weight_p95", "weight", "95 % quantile of w", |r| r.weights.quantiles[4]),
     column("weight_p99", "weight", "99 % quantile of w", |r| r.weights.quantiles[5]),
     column("weight_max", "weight", "largest w", |r| r.weights.quantiles[6]),
+    column(
+        "advantage_weight_mean",
+        "weight",
+        "mean advantage weight times w of a batch, before it is divided out; 0 while none are in use, as the next three",
+        |r| r.batch_weights.mean,
+    ),
+    column(
+        "advantage_weight_effective",
+        SHARE,
+        "effective sample size (sum w)^2 / sum w^2 of the weights of a batch, as a share of it",
+        |r| r.batch_weights.effective,
+    ),
+    column("advantage_scale_reward", REWARD, "mean size of the advantage of reward over the data", |r| {
+        r.advantage_scales[0]
+    }),
+    column("advantage_scale_cost", COST, "mean size of the advantage of long-term cost over the data", |r| {
+        r.advantage_scales[1]
+    }),
 ];
 
 /// Columns of `speed.csv`: name, unit, meaning.
@@ -133,7 +160,7 @@ mod tests {
              `armor-train fit` writes one row every 100 steps, and `armor-train report DIR -o FILE.html` draws them. \
              This page is generated; `armor-train/src/run/columns.rs` is its source.\n\n\
              Scaled reward and cost are the recorded ones times `reward_scale` and `cost_scale`. \
-             A number is the mean over the steps of its row unless its meaning says otherwise.\n\n\
+             A number is the mean over the steps of its row that trained its network, 0 if none did, unless its meaning says otherwise.\n\n\
              ## metrics.csv\n\n\
              A resumed run writes the same bits as one never stopped.\n\n\
              | column | unit | meaning |\n|---|---|---|\n",

@@ -1,5 +1,7 @@
 use super::*;
 use crate::config::Preset;
+use crate::critic::bootstrap::Bootstrap;
+use crate::extraction::Extraction;
 use crate::run::{ALARMS_FILE, COLUMNS, Cause, METRICS_FILE, SPEED_FILE, Table};
 use crate::testing::recording;
 
@@ -81,6 +83,32 @@ fn a_resumed_run_writes_the_bits_of_one_never_stopped() {
         let bytes = |folder: &Path| std::fs::read(folder.join(name)).unwrap();
         assert!(bytes(straight.path()) == bytes(stopped.path()), "{name} differs");
     }
+}
+
+/// The last step of the critics, the first of the actor, and amid each phase.
+#[test]
+fn a_run_of_two_phases_resumes_with_the_same_bits() {
+    let mut config = config();
+    (config.bootstrap, config.extraction) = (Bootstrap::InSample, Extraction::Weighted);
+    (config.critic_steps, config.critic_sees_kappa) = (120, false);
+    let (straight, stopped) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    fit(&config, &data(), straight.path(), false, &mut Observer::until(u64::MAX)).unwrap();
+    for (part, stop_at) in [60, 119, 120, 121, 200].into_iter().enumerate() {
+        let outcome = fit(&config, &data(), stopped.path(), part > 0, &mut Observer::until(stop_at)).unwrap();
+        assert_eq!(outcome, Outcome::Stopped(stop_at));
+    }
+    fit(&config, &data(), stopped.path(), true, &mut Observer::until(u64::MAX)).unwrap();
+    for name in [METRICS_FILE, ALARMS_FILE, Checkpoint::FILE] {
+        let bytes = |folder: &Path| std::fs::read(folder.join(name)).unwrap();
+        assert!(bytes(straight.path()) == bytes(stopped.path()), "{name} differs");
+    }
+    let rows = Table::parse(&read(straight.path(), METRICS_FILE)).rows().unwrap();
+    let at = |row: usize, name: &str| super::super::columns::value(&rows[row], name);
+    assert!(at(0, "value_loss_reward") > 0.0 && at(0, "cloning_loss") == 0.0 && at(0, "q_reward_max") != 0.0);
+    assert!(at(1, "cloning_loss") > 0.0 && at(1, "advantage_weight_effective") > 0.0);
+    assert!(at(1, "advantage_scale_cost") > 0.0 && at(0, "advantage_scale_cost") == 0.0);
+    assert!(rows.iter().all(|row| super::super::columns::value(row, "lambda_kappa_0") == 0.0));
+    assert!(!read(straight.path(), ALARMS_FILE).contains("lambda"));
 }
 
 /// A critic that starts with its own weights as targets and learns far too fast.

@@ -76,7 +76,13 @@ impl Record {
             self.weights = WeightSummary::new(learner.weights());
         }
         let step = learner.state().step;
-        let snapshot = Snapshot { lambda_by_kappa: learner.lambda(self.kappas), weights: self.weights };
+        let advantages = learner.advantages();
+        let snapshot = Snapshot {
+            // A dual that is never trained has nothing to say.
+            lambda_by_kappa: if learner.trains_dual() { learner.lambda(self.kappas) } else { [0.0; 4] },
+            weights: self.weights,
+            advantage_scales: advantages.map_or([0.0; 2], |advantages| advantages.scales),
+        };
         let row = window.take_row(step, &snapshot).values();
         self.metrics.push(&row);
         self.alarms.look(&row).iter().for_each(|alarm| watch.alarm(alarm));

@@ -149,7 +149,7 @@ impl Study {
                 return Err(StudyError::Empty { file: file.into(), key });
             }
         }
-        Task::named(&study.task)?.plant()?;
+        Task::named(&study.task)?;
         let known = |column: &&String| COLUMNS.iter().any(|other| other.name == **column);
         match study.columns.iter().find(|column| !known(column)) {
             Some(column) => Err(StudyError::Column { column: column.clone() }),

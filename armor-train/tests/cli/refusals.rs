@@ -207,13 +207,24 @@ fn an_image_that_cannot_be_written_leaves_nothing_behind() {
 }
 
 #[test]
+fn a_simulator_that_cannot_be_installed_is_told_of_with_the_command_to_do_so() {
+    let bench = Bench::new();
+    bench.success(&ball_run("run", 1));
+    let mut command = bench.command(&["evaluate", "run", "--task", "SafetyBallRun-v0"]);
+    // No Python is found on an empty path.
+    let output = command.env("PATH", "").env("ARMOR_SIMULATORS", bench.path("simulators")).output().unwrap();
+    let told = error(&output);
+    assert!(told.contains("pip install --no-deps -r firmware-sim/python/simulators.txt"), "{told}");
+    assert!(text(&output.stderr).contains("installing the simulators in"));
+    assert!(!bench.path("simulators").exists());
+}
+
+#[test]
 fn a_policy_flies_its_own_native_task_within_the_limits_it_was_trained_with() {
     let bench = Bench::new();
     bench.success(&ball_run("run", 1));
     bench.success(&["export", "run", "-o", "policy.armor"]);
     let refused = |policy: &str, more: &[&str]| bench.failure(&[&["evaluate", policy, "--task"], more].concat());
-    let error = refused("policy.armor", &["SafetyBallRun-v0"]);
-    assert!(error.contains("SafetyBallRun-v0 needs its simulator, and only native tasks fly so far"), "{error}");
     let error = refused("policy.armor", &["ball-run", "--limit", "5,81"]);
     assert!(error.contains("cost limit 81 lies above what the policy was trained with; set a limit of at most 80"));
 

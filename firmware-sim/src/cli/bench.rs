@@ -11,6 +11,7 @@ use armor_infer::{Kernel, LoadError, Policy};
 use serde::Serialize;
 
 use super::output::{CommandResult, Output};
+use super::round_trip::{self, RoundTrips};
 use super::sampler_name;
 use crate::host::HostController;
 use crate::image_file::{ImageFile, NotAnImage};
@@ -30,11 +31,17 @@ pub(super) struct Bench {
     /// The policy images.
     #[arg(required = true, value_name = "IMAGE")]
     images: Vec<PathBuf>,
+    /// Measure the round trip of an action over the link as well, by TCP and by
+    /// standard streams, on the longest rung of each image and on its shortest.
+    #[arg(long)]
+    link: bool,
 }
 
 #[derive(Serialize)]
 struct Report {
     rungs: Vec<Row>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    link: Vec<RoundTrips>,
 }
 
 /// What one rung takes on one kernel.
@@ -73,7 +80,14 @@ impl Bench {
                 row.time(image, *kernel, round)?;
             }
         }
-        output.report(&Report { rungs: rows.into_iter().map(|(.., row)| row.finish()).collect() })
+        let mut link = Vec::new();
+        for (path, image) in self.images.iter().zip(&images).filter(|_| self.link) {
+            let rungs = &image.manifest().rungs;
+            for rung in rungs.first().into_iter().chain(rungs.last()) {
+                link.extend(round_trip::time(path, rung.steps)?);
+            }
+        }
+        output.report(&Report { rungs: rows.into_iter().map(|(.., row)| row.finish()).collect(), link })
     }
 }
 
@@ -149,6 +163,13 @@ impl fmt::Display for Report {
                 "\n  {precision:<9}{:<10}{:>4}  {chain:<9}{:>12}{latency_us_p50:>12.1}{latency_us_p99:>12.1}",
                 row.kernel, row.rung, row.macs_per_action
             )?;
+        }
+        if !self.link.is_empty() {
+            write!(f, "\n\nline   steps    median us      p99 us   from a state to its action, over the link")?;
+        }
+        for RoundTrips { line, steps, quantiles, .. } in &self.link {
+            let Quantiles { latency_us_p50, latency_us_p99, .. } = quantiles;
+            write!(f, "\n{line:<7}{steps:>5}{latency_us_p50:>13.1}{latency_us_p99:>12.1}")?;
         }
         Ok(())
     }

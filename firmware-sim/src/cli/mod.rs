@@ -4,6 +4,7 @@ mod bench;
 mod flash;
 mod inspect;
 pub mod output;
+mod round_trip;
 mod run;
 mod serve;
 mod trace;

@@ -18,6 +18,8 @@ pub struct FloatReference {
     action_low: DVector<f64>,
     action_high: DVector<f64>,
     kappa_scale: f64,
+    /// Knots of the image's budget map; empty where it has none.
+    budget_map: Vec<(Cost, f64)>,
     kappa: [Layer; 3],
     /// Layer 1 over the action, the normalised state and the kappa embedding, one after the other.
     layer_1: Layer,
@@ -45,6 +47,12 @@ impl FloatReference {
             action_low: vector(numbers.action_low),
             action_high: vector(numbers.action_high),
             kappa_scale: manifest.kappa.scale.into(),
+            budget_map: numbers
+                .budget_map
+                .iter()
+                .flat_map(|map| map.knots())
+                .map(|(budget, x)| (budget, x.into()))
+                .collect(),
             kappa: numbers.kappa.map(|dense| layer(&dense)),
             layer_1: layer(&Dense { weights: &layer_1, bias: network.context_state.bias }),
             time: matrix(hidden, network.time_table),
@@ -86,9 +94,24 @@ impl FloatReference {
         }
     }
 
+    /// The remaining budget, or what the image's map makes of it.
+    pub(super) fn condition(&self, kappa: Cost) -> f64 {
+        let units = |budget: Cost| f64::from(budget.to_raw()) / 65536.0;
+        let above = self.budget_map.iter().position(|(budget, _)| *budget > kappa);
+        match (self.budget_map.as_slice(), above) {
+            ([], _) => kappa.to_f32().into(),
+            ([.., (_, last)], None) => *last,
+            ([(_, first), ..], Some(0)) => *first,
+            (knots, Some(after)) => {
+                let [(start, low), (end, high)] = [knots[after - 1], knots[after]];
+                low + (units(kappa) - units(start)) / (units(end) - units(start)) * (high - low)
+            }
+        }
+    }
+
     fn kappa_embedding(&self, kappa: Cost) -> DVector<f64> {
         let [one, two, three] = &self.kappa;
-        let scaled = DVector::from_element(1, self.kappa_scale * f64::from(kappa.to_f32()));
+        let scaled = DVector::from_element(1, self.kappa_scale * self.condition(kappa));
         three.apply(&two.apply(&one.apply(&scaled).map(mish)).map(mish))
     }
 

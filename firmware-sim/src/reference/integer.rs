@@ -2,6 +2,7 @@
 //! wide integers for what is integer there, f32 for what is f32. It lays all
 //! weights out as matrices of whole numbers and computes its own table of Mish.
 
+use armor_core::budget_map::BudgetMap;
 use armor_core::image::{Dense, IntegerNetwork, PolicyImage, Precision, Rows};
 use armor_core::mish::mish;
 use armor_core::schedule::ChainStep;
@@ -16,6 +17,8 @@ pub struct IntegerReference {
     state_factor: Vec<f32>,
     action_low: Vec<f32>,
     action_high: Vec<f32>,
+    /// Knots of the budget map, raw budget and condition bits; none where the condition is the budget.
+    budget_map: Vec<[u32; 2]>,
     kappa_scale: f32,
     /// Weights output by output, and biases.
     kappa: [(Vec<Vec<f32>>, Vec<f32>); 3],
@@ -71,6 +74,10 @@ impl IntegerReference {
             state_factor: numbers.state_factor.into(),
             action_low: numbers.action_low.into(),
             action_high: numbers.action_high.into(),
+            budget_map: numbers
+                .budget_map
+                .map(|map| map.knots().map(|(budget, condition)| [budget.to_raw(), condition.to_bits()]).collect())
+                .unwrap_or_default(),
             kappa_scale: manifest.kappa.scale,
             kappa: numbers.kappa.map(|dense| by_output(&dense)),
             context_state: layer(&network.context_state, s),
@@ -135,8 +142,9 @@ impl IntegerReference {
 
     fn kappa_embedding(&self, kappa: Cost) -> Vec<f32> {
         let [one, two, three] = &self.kappa;
+        let condition = BudgetMap::new(&self.budget_map).map_or(kappa.to_f32(), |map| map.condition(kappa));
         let active = |values: Vec<f32>| values.into_iter().map(mish).collect::<Vec<f32>>();
-        affine(three, &active(affine(two, &active(affine(one, &[self.kappa_scale * kappa.to_f32()])))))
+        affine(three, &active(affine(two, &active(affine(one, &[self.kappa_scale * condition])))))
     }
 
     /// `eps(a^n, n | s, kappa)`, given what `s` and `kappa` make of layer 1.

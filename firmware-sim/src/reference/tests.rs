@@ -34,6 +34,35 @@ fn it_agrees_with_the_controller_to_single_precision() {
     }
 }
 
+/// Between, on and beyond the knots, where the budget falls by 1 a step.
+#[test]
+fn it_agrees_with_the_controller_on_a_budget_map() {
+    let mut parts = Parts::random("ball-run", BALL_RUN, 3);
+    let knots = [(1.5f32, -2.0f32), (3.0, 4.0), (5.25, 9.0)];
+    let raw = |budget: f32| CostLimit::new(budget).unwrap().cost().to_raw();
+    *parts.section(SectionKind::BudgetMap) =
+        knots.iter().flat_map(|&(budget, condition)| [raw(budget), condition.to_bits()]).collect();
+    let conditions = with_image(&parts, |image| {
+        let mut controller =
+            HostController::new(Policy::load(image).unwrap(), CostLimit::new(7.0).unwrap(), SEED).unwrap();
+        let Reference::Float(reference) = Reference::new(image) else { panic!("the fixture is in single precision") };
+        (0..7)
+            .map(|tick| {
+                let step = controller.step(&STATE, f32::from(tick > 0));
+                let chain = reference.chain(step.rung.unwrap(), &STATE, step.kappa, SEED, tick);
+                for (entry, expected) in step.action.iter().zip(chain.action) {
+                    assert!((f64::from(*entry) - expected).abs() < 2e-5, "{entry} is not {expected}");
+                }
+                reference.condition(step.kappa)
+            })
+            .collect::<Vec<_>>()
+    });
+    let expected = [9.0, 9.0, 4.0 + 2.0 / 2.25 * 5.0, 4.0 + 1.0 / 2.25 * 5.0, 4.0, 0.0, -2.0];
+    for (found, expected) in conditions.iter().zip(expected) {
+        assert!((found - expected).abs() < 1e-12, "{conditions:?}");
+    }
+}
+
 /// A network that always says `eps = 0.5`: the deterministic chain keeps
 /// its first estimate, `(a^N - sqrt(1 - abar_N) / 2) / sqrt(abar_N)`, clipped.
 #[test]

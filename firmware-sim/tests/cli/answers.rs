@@ -114,9 +114,34 @@ fn actions_are_timed() {
 }
 
 #[test]
+fn round_trips_over_the_link_are_timed() {
+    let bench = Bench::new();
+    let report = bench.json(&["bench", "policy.armor", "--link"]);
+    let rows: Vec<_> = report["link"].as_array().unwrap().iter().map(|row| (&row["line"], &row["steps"])).collect();
+    let [tcp, stdio] = ["tcp", "stdio"].map(Value::from);
+    assert_eq!(rows, [(&tcp, &5.into()), (&stdio, &5.into()), (&tcp, &2.into()), (&stdio, &2.into())]);
+    assert!(report["link"].as_array().unwrap().iter().all(|row| row["latency_us_p50"].as_f64().unwrap() > 0.0));
+}
+
+/// The hello of docs/link.md; the plant leaves after it.
+#[test]
+fn a_plant_is_served_on_standard_streams() {
+    let bench = Bench::new();
+    let mut child = bench.command(&["serve", "policy.armor", "--stdio"]);
+    let mut child = child.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let hello = [0x01, 0x06, 0x01, 0x69, 0x22, 0xDE, 0x36, 0x00];
+    std::io::Write::write_all(&mut child.stdin.take().unwrap(), &hello).unwrap();
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(0));
+    assert!(output.stdout.windows(8).any(|window| window == b"ball-run"));
+    assert_eq!(output.stdout.iter().position(|&byte| byte == 0), Some(output.stdout.len() - 1));
+    assert!(text(&output.stderr).ends_with("plant left after 0 episodes, 0 actions, 0 faults\n"));
+}
+
+#[test]
 fn help_fits_a_terminal() {
     let bench = Bench::new();
-    for command in ["inspect", "verify", "trace", "flash", "run", "bench"] {
+    for command in ["inspect", "verify", "trace", "flash", "run", "bench", "serve"] {
         let output = bench.run(&[command, "--help"]);
         assert_eq!(output.status.code(), Some(0));
         fits_a_terminal(&output);

@@ -16,6 +16,8 @@ fn wrong_arguments_are_bad_usage() {
         assert!(bench.misuse(&[&RUN[..], &[&format!("{option}={value}")]].concat()).contains(option));
     }
     bench.misuse(&["run", "--chip", "robot.chip", "--task", "ball-run", "--episodes", "0"]);
+    bench.misuse(&["serve", "policy.armor"]);
+    bench.misuse(&["serve", "policy.armor", "--stdio", "--listen", "127.0.0.1:0"]);
 }
 
 #[test]
@@ -32,9 +34,10 @@ fn what_is_no_whole_image_is_refused_by_every_command_that_takes_one() {
         ("empty.armor", "image is cut short"),
         ("none.armor", "cannot read none.armor"),
     ] {
-        for command in ["inspect", "bench", "flash", "trace"] {
+        for command in ["inspect", "bench", "flash", "trace", "serve"] {
             let options: &[&str] = match command {
                 "flash" => &["--chip", "robot.chip"],
+                "serve" => &["--stdio"],
                 "trace" => &["--state", "state.txt", "--kappa", "1", "--seed", "1"],
                 _ => &[],
             };
@@ -55,7 +58,7 @@ fn a_flight_that_does_not_fit_is_refused() {
     assert!(with(&["--rate", "7"]).contains("30 Hz or a whole fraction, not at 7"));
     assert!(with(&["--limit", &(TRAINED_MAX + 1.0).to_string()]).contains("set a limit of at most 40"));
     let simulator = ["run", "--chip", "robot.chip", "--task", "SafetyPointGoal1-v0"];
-    assert!(bench.failure(&simulator).contains("only native tasks fly so far; use ball-run"));
+    assert!(bench.failure(&simulator).contains("needs its simulator: fly it by armor-train evaluate"));
 
     for (name, parts, message) in [
         ("other-task", Parts::random("point-goal", BALL_RUN, 1), "trained for point-goal and not for ball-run"),

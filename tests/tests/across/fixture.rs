@@ -146,7 +146,7 @@ pub(crate) fn policy() -> &'static Policy {
         let run = Run::new();
         assert_eq!(run.fit(&config, shipped(), None), Outcome::Done);
         let checkpoint = run.checkpoint();
-        let exported = export(&checkpoint, shipped()).unwrap();
+        let exported = export(&checkpoint, shipped(), None).unwrap();
         Policy { checkpoint, exported }
     })
 }

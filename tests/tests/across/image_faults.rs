@@ -121,7 +121,7 @@ fn of_another_size() -> [AlignedBytes; 2] {
     config.task = "three-legs".to_owned();
     let run = Run::new();
     run.fit(&config, &data, None);
-    let bytes = export(&run.checkpoint(), &data).unwrap().bytes;
+    let bytes = export(&run.checkpoint(), &data, None).unwrap().bytes;
     let renamed = sealed_anew(&bytes, |manifest| manifest.task = "ball-run");
     [bytes, renamed]
 }
@@ -139,7 +139,8 @@ pub(crate) fn sealed_anew(bytes: &AlignedBytes, change: impl FnOnce(&mut Manifes
             bytes.as_chunks().0.iter().map(|word| u32::from_le_bytes(*word)).collect()
         })
         .collect();
-    let contents: [&[u32]; SECTION_COUNT] = std::array::from_fn(|index| &sections[index][..]);
+    let contents: [&[u32]; SECTION_COUNT] =
+        std::array::from_fn(|index| sections.get(index).map_or(&[][..], Vec::as_slice));
     let mut manifest = image.manifest().clone();
     change(&mut manifest);
     let mut out = AlignedBytes::filled(0, bytes.as_slice().len() + 16);

@@ -1,0 +1,112 @@
+use super::*;
+use crate::config::Preset;
+use crate::critic::bootstrap::Bootstrap;
+use crate::testing::recording;
+
+/// Critics first, in the sample, then the actor by advantage weights; more samples than a share.
+fn config() -> Config {
+    let mut config = Preset::Quick.config("test", 1.0);
+    (config.hidden, config.trunk, config.head, config.dual_hidden) = (8, 8, 8, 8);
+    (config.batch, config.steps, config.critic_steps) = (SHARE + 32, 20, 10);
+    (config.bootstrap, config.extraction) = (Bootstrap::InSample, Extraction::Weighted);
+    config.relabel_share = 0.5;
+    config
+}
+
+fn data() -> Dataset {
+    recording(8, 5, |row| (row as f32).sin(), |row| f32::from(row % 3 == 0))
+}
+
+fn after(config: &Config, data: &Dataset, steps: u64) -> LearnerState<f32> {
+    let mut learner: Learner<'_, f32> = Learner::new(config.clone(), data);
+    for _ in 0..steps {
+        learner.step();
+    }
+    learner.state().clone()
+}
+
+#[test]
+fn the_critics_learn_first_and_are_frozen_while_the_actor_learns() {
+    let (config, data) = (config(), data());
+    let [start, critics, end] = [0, 10, 20].map(|steps| after(&config, &data, steps).parameters);
+    assert_ne!((&start.critic, &start.target), (&critics.critic, &critics.target));
+    assert_ne!(start.state_value, critics.state_value);
+    assert_eq!(start.actor, critics.actor);
+    assert_eq!((&critics.critic, &critics.target), (&end.critic, &end.target));
+    assert_eq!(critics.state_value, end.state_value);
+    assert_ne!(critics.actor, end.actor);
+    assert_eq!(start.dual, end.dual);
+}
+
+#[test]
+fn each_phase_measures_what_it_trains() {
+    let (config, data) = (config(), data());
+    let mut learner: Learner<'_, f32> = Learner::new(config, &data);
+    let metrics: Vec<Metrics> = (0..20).map(|_| learner.step()).collect();
+    let (critics, actor) = (&metrics[9], &metrics[10]);
+    assert!(critics.critic.is_some_and(|critic| critic.value_losses.iter().all(|&loss| loss > 0.0)));
+    assert!(critics.values.is_some() && critics.actor.is_none() && critics.batch_weights.is_none());
+    assert!(actor.actor.is_some_and(|actor| actor.cloning > 0.0) && actor.critic.is_none() && actor.values.is_none());
+    let weights = actor.batch_weights.unwrap();
+    assert!(weights.mean > 0.0 && weights.effective > 0.0 && weights.effective <= 1.0);
+}
+
+/// At no price and no temperature every transition weighs what Eq. 10 says.
+#[test]
+fn without_temperature_the_weights_are_those_of_eq_10() {
+    let data = data();
+    let mut config = config();
+    (config.advantage_temperature, config.reweight_warmup) = (0.0, 0);
+    let mut learner: Learner<'_, f32> = Learner::new(config.clone(), &data);
+    for _ in 0..11 {
+        learner.step();
+    }
+    let combined = &learner.weights().combined;
+    let (low, high) = combined.iter().fold((f32::MAX, 0f32), |(low, high), &w| (low.min(w), high.max(w)));
+    assert!(low < high, "feasible trajectories weigh more");
+    let batch: Vec<f32> = learner.workers.iter().flat_map(|worker| worker.batch.weight.clone()).collect();
+    let mean = batch.iter().sum::<f32>() / batch.len() as f32;
+    assert!((mean - 1.0).abs() < 1e-5);
+    let ratios: Vec<f32> = batch.iter().map(|weight| weight / batch[0]).collect();
+    let allowed = [1.0, low / high, high / low];
+    assert!(ratios.iter().all(|ratio| allowed.iter().any(|a| (ratio - a).abs() < 1e-4)), "{ratios:?}");
+    assert!(ratios.iter().any(|ratio| (ratio - 1.0).abs() > 0.1));
+}
+
+#[test]
+fn a_guided_actor_may_follow_frozen_critics() {
+    let data = data();
+    let mut config = config();
+    config.extraction = Extraction::Guidance;
+    let [critics, end] = [10, 20].map(|steps| after(&config, &data, steps).parameters);
+    assert_eq!(critics.critic, end.critic);
+    assert_ne!((&critics.actor, &critics.dual), (&end.actor, &end.dual));
+}
+
+#[test]
+fn a_critic_that_does_not_see_kappa_has_one_opinion_at_every_budget() {
+    let data = data();
+    let mut config = config();
+    for sees in [true, false] {
+        config.critic_sees_kappa = sees;
+        let learner: Learner<'_, f32> = Learner::new(config.clone(), &data);
+        let (critic, parameters) = (&learner.model.critic, &learner.state.parameters.critic);
+        let at = |kappa: f32| {
+            let mut tape = critic.tape(1);
+            let (state, action) = (nalgebra::DMatrix::from_element(2, 1, 0.5), nalgebra::DMatrix::zeros(1, 1));
+            critic.forward(parameters, &Task::ALL, (&state, &[kappa], &action), &mut tape, false);
+            Task::ALL.map(|task| tape.pessimistic(task).next().unwrap())
+        };
+        assert_eq!(at(0.0) != at(2.0), sees);
+    }
+}
+
+#[test]
+fn the_bits_do_not_depend_on_the_number_of_threads() {
+    let (config, data) = (config(), data());
+    let with = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| after(&config, &data, 20))
+    };
+    assert!(with(1) == with(3));
+}
