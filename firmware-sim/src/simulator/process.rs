@@ -58,7 +58,7 @@ pub(super) fn fly<'a>(
     let mut command = Command::new(&python);
     command.env("PYTHONPATH", package).args(["-m", "armor_plant", task, "--each"]);
     command.args(["--connect", &address.to_string(), "--patience", &PATIENCE.as_secs().to_string()]);
-    command.args(["--limit", &plan.limit.cost().to_f32().to_string(), "--seed", &plan.seed.to_string()]);
+    command.args(["--limit", &f64::from(plan.limit.cost().to_f32()).to_string(), "--seed", &plan.seed.to_string()]);
     command.args(["--first", &episodes.start.to_string(), "--episodes", &episodes.len().to_string()]);
     command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
     let child = command.spawn().map_err(SimulatorError::system("run", &python))?;

@@ -71,10 +71,14 @@ class Process:
         return _or_end(os.read(self._output.fileno(), _CHUNK))
 
     def close(self) -> None:
-        """Hang up, and wait for the command to end."""
+        """Hang up, and wait for the command to end; one that does not is killed."""
         self._input.close()
         self._output.close()
-        self._child.wait(timeout=10)
+        try:
+            self._child.wait(timeout=10)
+        except subprocess.TimeoutExpired:
+            self._child.kill()
+            self._child.wait()
 
 
 def _or_end(data: bytes) -> bytes:

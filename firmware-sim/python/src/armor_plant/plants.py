@@ -5,6 +5,7 @@ many were flown before.
 """
 
 import contextlib
+import io
 import os
 import random
 import sys
@@ -61,6 +62,7 @@ def make(name: str) -> Plant:
     is_bullet = task.name in ("SafetyAntRun-v0", "SafetyBallRun-v0", "SafetyDroneRun-v0")
     try:
         with _quiet():
+            _load_gymnasium()
             return BulletPlant(task) if is_bullet else MujocoPlant(task)
     except ModuleNotFoundError as error:
         raise SimulatorMissingError(f"{error}; install the simulators: {INSTALL}") from error
@@ -130,6 +132,12 @@ class MujocoPlant:
             terminated=bool(terminated),
             goal=bool(info.get("goal_met", False)),
         )
+
+
+def _load_gymnasium() -> None:
+    """Import what both simulators build on, without the news that its plug-ins print."""
+    with contextlib.redirect_stderr(io.StringIO()):
+        import gymnasium  # noqa: F401
 
 
 def _seed_everything(seed: int) -> None:
