@@ -13,7 +13,7 @@ use crate::extraction::advantage::{Advantages, Judges};
 use crate::extraction::cloning::Cloning;
 use crate::extraction::condition::Condition;
 use crate::extraction::weight::{self, BatchWeights};
-use crate::model::{Model, Optimisers, Parameters};
+use crate::model::{ActorCopy, Model, Optimisers, Parameters};
 use crate::nn::{Scalar, dot, soft_update};
 use crate::normaliser::Normaliser;
 use crate::pcgrad::{self, Order};
@@ -56,14 +56,14 @@ pub struct LearnerState<T: Scalar> {
     pub optimisers: Optimisers<T>,
     /// `w_cf` of each transition; all 1 before the first refresh.
     pub counterfactual: Vec<f32>,
-    /// Moving average of the actor's weights; empty where none is kept.
-    pub actor_average: Vec<T>,
+    /// Share of the transitions that the last refresh raised.
+    pub counterfactual_active: f64,
 }
 
 impl<T: Scalar> LearnerState<T> {
     /// The actor's weights that fly: their moving average, where one is kept.
     pub fn flying_actor(&self) -> &[T] {
-        if self.actor_average.is_empty() { &self.parameters.actor } else { &self.actor_average }
+        self.parameters.actor_copy(ActorCopy::Average)
     }
 }
 
@@ -92,9 +92,9 @@ impl<'d, T: Scalar> Learner<'d, T> {
         let state = LearnerState {
             step: 0,
             optimisers: Optimisers::new(&config, &parameters),
-            actor_average: if config.actor_average > 0.0 { parameters.actor.clone() } else { Vec::new() },
             parameters,
             counterfactual: vec![1.0; data.len()],
+            counterfactual_active: 0.0,
         };
         Self::resume(config, data, state)
     }
@@ -108,7 +108,7 @@ impl<'d, T: Scalar> Learner<'d, T> {
         let workers = shares.map(|first| Worker::new(&model, first, SHARE.min(config.batch - first))).collect();
         let mut reweighting = Reweighting::new(&config, data);
         if reweighting.refreshes(state.step) > 0 {
-            reweighting.restore(&state.counterfactual);
+            reweighting.restore(&state.counterfactual, state.counterfactual_active);
         }
         Self {
             data,
@@ -144,7 +144,7 @@ impl<'d, T: Scalar> Learner<'d, T> {
             Order::Random => noise.words(stream::SURGERY, step, 0),
             Order::Fixed | Order::Off => [0; 4],
         };
-        let LearnerState { parameters, optimisers, actor_average, .. } = &mut self.state;
+        let LearnerState { parameters, optimisers, .. } = &mut self.state;
         let (model, workers) = (&self.model, &mut self.workers);
 
         optimisers.schedule(&self.config, step);
@@ -175,7 +175,8 @@ impl<'d, T: Scalar> Learner<'d, T> {
                 gradients
             };
             [metrics.gradient_norms[1], metrics.gradient_norms[2]] = gradients.map(|g| dot(&g, &g).sqrt());
-            soft_update(actor_average, &parameters.actor, T::of(1.0 - self.config.actor_average));
+            let average_rate = T::of(1.0 - self.config.actor_average);
+            soft_update(&mut parameters.actor_average, &parameters.actor, average_rate);
         }
         self.state.step += 1;
         metrics
@@ -229,9 +230,11 @@ impl<'d, T: Scalar> Learner<'d, T> {
     /// Refreshes the weights of all transitions (Eqs. 8 to 10).
     fn reweight(&mut self) {
         let source = Source::new(&self.config, self.data, &self.normaliser);
-        let critic = (&self.model.critic, &self.state.parameters.critic[..]);
+        let parameters = &self.state.parameters;
+        let critic = (&self.model.critic, parameters.critic_copy(self.config.counterfactual_critic));
         let (step, counterfactual) = (self.state.step, &mut self.state.counterfactual);
-        self.reweighting.refresh(&source, critic, (self.noise, step), counterfactual);
+        self.state.counterfactual_active =
+            self.reweighting.refresh(&source, critic, (self.noise, step), counterfactual);
     }
 
     /// The effective configuration.
@@ -274,7 +277,7 @@ impl<'d, T: Scalar> Learner<'d, T> {
     }
 
     /// Refreshes of the weights so far.
-    pub const fn refreshes(&self) -> u64 {
+    pub fn refreshes(&self) -> u64 {
         self.reweighting.refreshes(self.state.step)
     }
 

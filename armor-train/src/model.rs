@@ -29,6 +29,12 @@ pub struct Model {
     pub dual: Dual,
     /// Factor on the squared norm of the dual's weights in its loss.
     pub dual_decay: f64,
+    /// Whether a moving average of the actor's weights is kept.
+    pub keeps_average: bool,
+    /// The actor that takes the next action of the targets.
+    pub target_actor: ActorCopy,
+    /// The critic that judges the policy's actions.
+    pub policy_critic: CriticCopy,
     /// Chain that samples the next action of the targets.
     pub target_chain: Vec<ChainStep<f64>>,
     /// Discounts of reward, long-term and short-term cost.
@@ -47,6 +53,8 @@ pub struct Model {
 pub struct Parameters<T: Scalar> {
     /// Denoiser, phi.
     pub actor: Vec<T>,
+    /// Moving average of the denoiser's weights; empty where none is kept.
+    pub actor_average: Vec<T>,
     /// Critic, theta.
     pub critic: Vec<T>,
     /// Target critic, theta minus.
@@ -55,6 +63,44 @@ pub struct Parameters<T: Scalar> {
     pub state_value: Vec<T>,
     /// Dual network.
     pub dual: Vec<T>,
+}
+
+/// A copy of the critic (O-15, O-19).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum CriticCopy {
+    /// The one that learns (the paper).
+    Live,
+    /// The target critic, which follows it slowly.
+    Target,
+}
+
+/// A copy of the actor (O-10).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ActorCopy {
+    /// The one that learns (the paper).
+    Live,
+    /// The moving average of its weights.
+    Average,
+}
+
+impl<T: Scalar> Parameters<T> {
+    /// The numbers of a copy of the critic.
+    pub fn critic_copy(&self, copy: CriticCopy) -> &[T] {
+        match copy {
+            CriticCopy::Live => &self.critic,
+            CriticCopy::Target => &self.target,
+        }
+    }
+
+    /// The numbers of a copy of the actor; of the live one where no average is kept.
+    pub fn actor_copy(&self, copy: ActorCopy) -> &[T] {
+        match copy {
+            ActorCopy::Average if !self.actor_average.is_empty() => &self.actor_average,
+            ActorCopy::Live | ActorCopy::Average => &self.actor,
+        }
+    }
 }
 
 /// The optimisers of the networks that learn by gradients.
@@ -133,6 +179,9 @@ impl Model {
                 config.kappa_scale,
             ),
             dual_decay: config.dual_decay,
+            keeps_average: config.actor_average > 0.0,
+            target_actor: config.target_actor,
+            policy_critic: config.policy_critic,
             target_chain: process.chain(config.target_sampler, config.target_steps),
             gradient_clip: config.gradient_clip,
             pcgrad: config.pcgrad,
@@ -163,7 +212,8 @@ impl Model {
             state_value.resize(value.size(), T::zero());
             value.initialise(&mut state_value, &mut draws(3));
         }
-        Parameters { actor, target: critic.clone(), critic, state_value, dual }
+        let actor_average = if self.keeps_average { actor.clone() } else { Vec::new() };
+        Parameters { actor, actor_average, target: critic.clone(), critic, state_value, dual }
     }
 }
 
@@ -201,8 +251,14 @@ mod tests {
         let mut config = Preset::Paper.config("own", 1.0);
         (config.steps, config.actor_rate, config.final_rate) = (10, 1.0, 0.2);
         let first_step = |step| {
-            let mut parameters =
-                Parameters { actor: vec![0.0f64], critic: vec![], target: vec![], state_value: vec![], dual: vec![] };
+            let mut parameters = Parameters {
+                actor: vec![0.0f64],
+                actor_average: vec![],
+                critic: vec![],
+                target: vec![],
+                state_value: vec![],
+                dual: vec![],
+            };
             let mut optimisers = Optimisers::new(&config, &parameters);
             optimisers.schedule(&config, step);
             optimisers.actor.descend(&mut parameters.actor, &[1.0]);

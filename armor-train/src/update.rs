@@ -112,9 +112,10 @@ impl<T: Scalar> Worker<T> {
             in_sample.regress((value, &parameters.state_value), (batch, batch_len), target_tape);
         } else {
             let (first, denoiser) = (self.first, &model.actor.denoiser);
-            denoiser.prepare(&parameters.actor, &batch.next_state, &batch.next_kappa, &mut self.next_context);
+            let actor = parameters.actor_copy(model.target_actor);
+            denoiser.prepare(actor, &batch.next_state, &batch.next_kappa, &mut self.next_context);
             let draw = |stage: usize, sample: usize, out: &mut [T]| draw(stage, first + sample, out);
-            self.next_chain.run(denoiser, &parameters.actor, &self.next_context, &draw);
+            self.next_chain.run(denoiser, actor, &self.next_context, &draw);
             let next = (&batch.next_state, &batch.next_kappa[..], &self.next_chain.action);
             critic.forward(&parameters.target, &Task::ALL, next, target_tape, false);
         }
@@ -177,7 +178,10 @@ impl<T: Scalar> Worker<T> {
 
 /// The networks that judge the actor.
 fn judges<'a, T: Scalar>(model: &'a Model, parameters: &'a Parameters<T>) -> Judges<'a, T> {
-    Judges { critic: (&model.critic, &parameters.critic), dual: (&model.dual, &parameters.dual) }
+    Judges {
+        critic: (&model.critic, parameters.critic_copy(model.policy_critic)),
+        dual: (&model.dual, &parameters.dual),
+    }
 }
 
 /// Updates the critic: Eqs. 3 and 4 in every share, Eq. 5 on the trunk, one step of Adam;
@@ -249,7 +253,7 @@ pub fn update_imitation<T: Scalar>(
     (loss, gradient)
 }
 
-/// Updates actor and dual (Eqs. 15 and 16), one step of Adam each, judged by the live critic.
+/// Updates actor and dual (Eqs. 15 and 16), one step of Adam each.
 ///
 /// `draw` gives the noise of the policy's chain by stage and place in the
 /// batch. Returns the losses as means over the batch, and the gradients of actor and dual.

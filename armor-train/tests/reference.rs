@@ -8,7 +8,7 @@ use armor_train::actor::denoiser::{Denoiser, Widths};
 use armor_train::actor::{Actor, CloningNorm, Guidance, PolicyGradient, Process};
 use armor_train::critic::{Critic, Task};
 use armor_train::dual::{Dual, DualOptions};
-use armor_train::model::{Model, Optimisers, Parameters};
+use armor_train::model::{ActorCopy, CriticCopy, Model, Optimisers, Parameters};
 use armor_train::nn::Adam;
 use armor_train::pcgrad::{Order, Pooling};
 use armor_train::reweight::Weights;
@@ -84,6 +84,9 @@ impl Reference {
             dual: Dual::new(DualOptions::default(), 9, kappa_scale),
             dual_decay: 0.0,
             state_value: None,
+            keeps_average: false,
+            target_actor: ActorCopy::Live,
+            policy_critic: CriticCopy::Live,
             target_chain: schedule.chain(Sampler::Ddpm, STEPS).collect(),
             discounts: [0.99, 0.99, 0.3],
             gradient_clip: 0.0,
@@ -95,6 +98,7 @@ impl Reference {
     fn parameters(&self) -> Parameters<f64> {
         Parameters {
             actor: self.numbers("actor"),
+            actor_average: Vec::new(),
             critic: self.numbers("critic"),
             target: self.numbers("target_critic"),
             state_value: Vec::new(),
@@ -274,6 +278,7 @@ fn counterfactual_weights_are_pytorchs() {
         trajectory: to_f32(reference.numbers("w_traj")),
         counterfactual: vec![1.0; SAMPLES],
         combined: vec![1.0; SAMPLES],
+        active: 0.0,
     };
     let rows: Vec<usize> = (0..SAMPLES).collect();
     settings.update(&to_f32(margin), &rows, &mut weights.counterfactual);

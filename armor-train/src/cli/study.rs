@@ -16,10 +16,11 @@ use super::flyer::Flyer;
 use crate::data::Dataset;
 use crate::export::export;
 use crate::run::{Checkpoint, METRICS_FILE, Outcome, Table};
-use crate::study::{Flown, Row, Run, Score, Study as Definition, markdown};
+use crate::study::{ABLATION, Flown, Row, Run, Score, Study as Definition, markdown};
 
 /// The studies that ship with the project.
-const SHIPPED: [(&str, &str); 2] = [
+const SHIPPED: [(&str, &str); 3] = [
+    ("ablation", ABLATION),
     ("options-ball-run", include_str!("../../studies/options-ball-run.toml")),
     ("options-point-circle", include_str!("../../studies/options-point-circle.toml")),
 ];

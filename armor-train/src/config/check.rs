@@ -7,6 +7,7 @@ use crate::actor::{Family, PolicyGradient};
 use crate::critic::bootstrap::Bootstrap;
 use crate::extraction::Extraction;
 use crate::extraction::condition::Condition;
+use crate::model::ActorCopy;
 
 impl Config {
     /// Whether every option lies in its range.
@@ -97,6 +98,9 @@ impl Config {
         )?;
         let is_code = self.time_code >= 4 && self.time_code.is_multiple_of(2) && self.time_code <= 1024;
         require("time_code", is_code, "even and between 4 and 1024")?;
+        let averages = self.actor_average > 0.0 || self.target_actor == ActorCopy::Live;
+        require("actor_average", averages, "above 0 where target_actor is average")?;
+        require("refresh_share", self.refresh_share > 0.0 && self.refresh_share <= 1.0, "above 0 and at most 1")?;
         let is_gaussian = self.policy == Family::Gaussian;
         require("diffusion_steps", !is_gaussian || self.diffusion_steps == 1, "1 where policy is gaussian")?;
         let last_k = 1..=self.diffusion_steps;

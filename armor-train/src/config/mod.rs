@@ -17,8 +17,10 @@ use crate::critic::{CostHeads, CostOutput, Trunk, TwinLoss};
 use crate::dual::DualClip;
 use crate::extraction::Extraction;
 use crate::extraction::condition::{Condition, LambdaRange};
+use crate::model::{ActorCopy, CriticCopy};
 use crate::pcgrad::{Order, Pooling};
 use crate::reweight::reference::Reference;
+use crate::reweight::{MarginMean, Scales};
 use crate::threshold::Threshold;
 
 pub use given::Given;
@@ -181,11 +183,19 @@ pub struct Config {
     /// Decay of a moving average of the actor's weights, which is exported in
     /// their place; 0, none, in the paper (O-10).
     pub actor_average: f64,
+    /// The actor that takes the next action of the targets (Eq. 3, O-10).
+    pub target_actor: ActorCopy,
+    /// The critic that judges the policy's actions (Eq. 15, O-15).
+    pub policy_critic: CriticCopy,
 
+    /// Which scales of reweighting are on (section 4.5).
+    pub reweight: Scales,
     /// Training steps before the weights are active (Table 2).
     pub reweight_warmup: u64,
     /// Training steps between refreshes of the weights (Table 2).
     pub reweight_interval: u64,
+    /// Share of the transitions that a refresh looks at (O-18).
+    pub refresh_share: f64,
     /// Share of the new value in the moving average of counterfactual weights (Table 2, O-21).
     pub reweight_ema: f64,
     /// Trajectory weight control coefficient, beta (Eq. 6, Table 2).
@@ -203,6 +213,10 @@ pub struct Config {
     pub counterfactual_reference: Reference,
     /// Added to that, in units of recorded cost; 0 in the paper.
     pub counterfactual_tolerance: f64,
+    /// The critic of Eq. 8 (O-19).
+    pub counterfactual_critic: CriticCopy,
+    /// Over what the margins of Eq. 9 have their mean (O-22).
+    pub margin_mean: MarginMean,
     /// Smallest weight, `w_min` (Eq. 10, Table 2).
     pub weight_min: f64,
     /// Largest weight, `w_max` (Eqs. 9 and 10, Table 2).

@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use super::Preset;
+use crate::study::{ABLATION, Study, Variant};
 
 /// An option of [`Config`](super::Config): its key, and its meaning with equation or reason.
 pub type Entry = (&'static str, &'static str);
@@ -153,6 +154,11 @@ pub const OPTIONS: [(&str, &[Entry]); 6] = [
                 "actor_average",
                 "decay of a moving average of the actor's weights, which is exported in their place; 0 is none (O-10)",
             ),
+            (
+                "target_actor",
+                "the actor that takes the next action of the targets (Eq. 3): `live`, or `average`, the moving average where one is kept (O-10)",
+            ),
+            ("policy_critic", "the critic that judges the policy's actions (Eq. 15): `live` or `target` (O-15)"),
         ],
     ),
     (
@@ -196,8 +202,16 @@ pub const OPTIONS: [(&str, &[Entry]); 6] = [
     (
         "Reweighting",
         &[
+            (
+                "reweight",
+                "which scales of reweighting are on: `both`, `trajectory` (Eq. 6), `counterfactual` (Eqs. 8 and 9), or `off`, all weights 1 (section 4.5)",
+            ),
             ("reweight_warmup", "training steps before the weights are active (Table 2)"),
             ("reweight_interval", "training steps between refreshes of the weights (Table 2)"),
+            (
+                "refresh_share",
+                "share of the transitions, drawn at random, that a refresh looks at; fewer are cheaper (O-18)",
+            ),
             ("reweight_ema", "share of the new value in the moving average of counterfactual weights (Table 2, O-21)"),
             ("beta", "trajectory weight control coefficient: feasible trajectories weigh 1 + beta (Eq. 6, Table 2)"),
             (
@@ -212,6 +226,8 @@ pub const OPTIONS: [(&str, &[Entry]); 6] = [
                 "what Q_cS is held against in Eq. 8: `kappa`, which leaves a margin at kappa 0 and 1 only, or `realised`, the short-horizon cost that the trajectory itself incurred",
             ),
             ("counterfactual_tolerance", "added to that, in units of recorded cost"),
+            ("counterfactual_critic", "the critic of Eq. 8: `live` or `target` (O-19)"),
+            ("margin_mean", "over what the margins of Eq. 9 have their mean: a `batch`, or the `data` (O-22)"),
             ("weight_min", "smallest weight, w_min (Eq. 10, Table 2)"),
             ("weight_max", "largest weight, w_max (Eqs. 9 and 10, Table 2)"),
         ],
@@ -265,6 +281,26 @@ pub fn document() -> String {
             let [paper, quick] = values(key);
             let _ = writeln!(text, "| `{key}` | {paper} | {quick} | {meaning} |");
         }
+    }
+    text.push_str(&ablation());
+    text
+}
+
+/// The variants of the paper's ablation as options.
+fn ablation() -> String {
+    let mut text = String::from(
+        "\n## The paper's ablation\n\n\
+         The eight variants of section 4.5, each on top of any preset; `armor-train study ablation` trains and \
+         flies them all. A Gaussian policy needs one step alone, for it is one. \
+         Where a horizon has no head of its own, one pair of heads learns the targets of both.\n\n\
+         | variant | `--set` |\n|---|---|\n",
+    );
+    // The study is part of the program, and a test parses it.
+    let variants = toml::from_str::<Study>(ABLATION).map(|study| study.variants).unwrap_or_default();
+    for Variant { name, set } in variants {
+        let options: Vec<String> = set.iter().map(|(key, value)| format!("`--set {key}={}`", plain(value))).collect();
+        let options = if options.is_empty() { "nothing".to_owned() } else { options.join(" ") };
+        let _ = writeln!(text, "| {name} | {options} |");
     }
     text
 }

@@ -10,8 +10,10 @@ use crate::critic::{CostHeads, CostOutput, Trunk, TwinLoss};
 use crate::dual::DualClip;
 use crate::extraction::Extraction;
 use crate::extraction::condition::Condition;
+use crate::model::{ActorCopy, CriticCopy};
 use crate::pcgrad::{Order, Pooling};
 use crate::reweight::reference::Reference;
+use crate::reweight::{MarginMean, Scales};
 use crate::threshold::Threshold;
 
 /// A named set of choices.
@@ -108,8 +110,12 @@ impl Preset {
             final_rate: 1.0,
             gradient_clip: 0.0,
             actor_average: 0.0,
+            target_actor: ActorCopy::Live,
+            policy_critic: CriticCopy::Live,
+            reweight: Scales::Both,
             reweight_warmup: 20_000,
             reweight_interval: 5_000,
+            refresh_share: 1.0,
             reweight_ema: 0.3,
             beta: 0.5,
             feasible_mass: 0.0,
@@ -118,6 +124,8 @@ impl Preset {
             sigma_per_entry: false,
             counterfactual_reference: Reference::Kappa,
             counterfactual_tolerance: 0.0,
+            counterfactual_critic: CriticCopy::Live,
+            margin_mean: MarginMean::Batch,
             weight_min: 0.8,
             weight_max: 2.0,
         };

@@ -4,12 +4,14 @@
 pub mod counterfactual;
 pub mod reference;
 mod refresh;
+mod scale;
 mod summary;
 pub mod trajectory;
 
 use crate::data::Dataset;
 
 pub use refresh::Reweighting;
+pub use scale::{MarginMean, Scales};
 pub use summary::WeightSummary;
 
 /// Guards the division by a mean of zero (Eqs. 9 and 10).
@@ -45,13 +47,16 @@ pub struct Weights {
     pub counterfactual: Vec<f32>,
     /// `w` (Eq. 10); all 1 before the first refresh.
     pub combined: Vec<f32>,
+    /// Share of the transitions with a margin above 0 (Eq. 8) at the last refresh.
+    pub active: f64,
 }
 
 impl Weights {
-    /// All scales off.
+    /// Weights before the first refresh; `beta` is that of Eq. 6.
     pub fn ones(data: &Dataset, limit: f32, beta: f64) -> Self {
+        let trajectory = trajectory::weights(data, limit, beta);
         let ones = vec![1.0; data.len()];
-        Self { trajectory: trajectory::weights(data, limit, beta), counterfactual: ones.clone(), combined: ones }
+        Self { trajectory, counterfactual: ones.clone(), combined: ones, active: 0.0 }
     }
 
     /// Eq. 10 over the whole data: `w = clip(w_traj w_cf / (E[w_traj w_cf] + eps), w_min, w_max)`.
@@ -67,7 +72,7 @@ mod tests {
     use super::*;
 
     fn weights(trajectory: Vec<f32>, counterfactual: Vec<f32>) -> Weights {
-        Weights { combined: vec![1.0; trajectory.len()], trajectory, counterfactual }
+        Weights { combined: vec![1.0; trajectory.len()], trajectory, counterfactual, active: 0.0 }
     }
 
     #[test]

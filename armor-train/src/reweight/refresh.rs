@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::counterfactual::Counterfactual;
 use super::reference::Bounds;
-use super::{Refresh, Weights, trajectory};
+use super::{MarginMean, Refresh, Scales, Weights, trajectory};
 use crate::batch::Batch;
 use crate::config::Config;
 use crate::critic::Critic;
@@ -22,7 +22,10 @@ pub struct Reweighting {
     bounds: Bounds,
     /// `[w_min, w_max]` of Eq. 10.
     clip: [f64; 2],
-    /// Transitions of a mini-batch of Eq. 9.
+    scales: Scales,
+    /// Share of the transitions that a refresh looks at.
+    share: f64,
+    /// Transitions over which margins have their mean (Eq. 9).
     mini_batch: usize,
     weights: Weights,
 }
@@ -50,25 +53,32 @@ impl Reweighting {
                 config.cost_scale,
             ),
             clip: [config.weight_min, config.weight_max],
-            mini_batch: config.batch,
+            scales: config.reweight,
+            share: config.refresh_share,
+            mini_batch: match config.margin_mean {
+                MarginMean::Batch => config.batch,
+                MarginMean::Data => data.len(),
+            },
             weights: Weights::ones(data, config.limit as f32, beta(config, data)),
         }
     }
 
-    /// The weights that followed from counterfactual weights of an earlier refresh.
-    pub fn restore(&mut self, counterfactual: &[f32]) {
+    /// The weights that followed from counterfactual weights of an earlier refresh,
+    /// which raised the share `active`.
+    pub fn restore(&mut self, counterfactual: &[f32], active: f64) {
         self.weights.counterfactual.copy_from_slice(counterfactual);
+        self.weights.active = active;
         self.weights.combine(self.clip);
     }
 
     /// Whether a refresh is due before training step `step`, counted from 0.
-    pub const fn is_due(&self, step: u64) -> bool {
-        self.refresh.is_due(step)
+    pub fn is_due(&self, step: u64) -> bool {
+        self.scales != Scales::Off && self.refresh.is_due(step)
     }
 
     /// Refreshes before `steps` training steps were done.
-    pub const fn refreshes(&self, steps: u64) -> u64 {
-        self.refresh.done(steps)
+    pub fn refreshes(&self, steps: u64) -> u64 {
+        if self.scales == Scales::Off { 0 } else { self.refresh.done(steps) }
     }
 
     /// The weights of all transitions.
@@ -76,44 +86,72 @@ impl Reweighting {
         &self.weights
     }
 
-    /// Eqs. 8 to 10 with the live critic; moves `counterfactual`, `w_cf` of all transitions.
+    /// Eqs. 8 to 10 with the given critic; moves `counterfactual`, `w_cf` of all
+    /// transitions, and returns the share of them that it raised.
     pub(crate) fn refresh<T: Scalar>(
         &mut self,
         source: &Source<'_>,
-        (critic, parameters): (&Critic, &[T]),
+        critic: (&Critic, &[T]),
         (noise, step): (Noise, u64),
         counterfactual: &mut [f32],
-    ) {
+    ) -> f64 {
         let rows = counterfactual.len();
-        let mut margins = vec![0.0f32; rows];
-        margins.par_chunks_mut(SHARE).enumerate().for_each(|(share, margins)| {
-            let first = share * SHARE;
-            let mut batch: Batch<T> = source.room(margins.len());
-            for sample in 0..margins.len() {
-                source.fill(&mut batch, sample, first + sample, 0.0);
+        let mut active = 0;
+        if self.scales.counterfactual() {
+            let mut looked_at = stream::shuffled(rows, noise, step);
+            looked_at.truncate((self.share * rows as f64).ceil() as usize);
+            let margins = self.margins(source, critic, (noise, step), &looked_at, rows);
+            for mini_batch in looked_at.chunks(self.mini_batch) {
+                self.counterfactual.update(&margins, mini_batch, counterfactual);
             }
-            let bound: Vec<T> = (first..first + margins.len()).map(|row| T::of(self.bounds.bound(row))).collect();
+            active = margins.iter().filter(|margin| **margin > 0.0).count();
+        }
+        let active = active as f64 / rows as f64;
+        self.restore(counterfactual, active);
+        active
+    }
+
+    /// The margins of Eq. 8 of all `rows` transitions; 0 for those that are not looked at.
+    fn margins<T: Scalar>(
+        &self,
+        source: &Source<'_>,
+        critic: (&Critic, &[T]),
+        (noise, step): (Noise, u64),
+        looked_at: &[usize],
+        rows: usize,
+    ) -> Vec<f32> {
+        let mut ascending = looked_at.to_vec();
+        ascending.sort_unstable();
+        let shares = ascending.par_chunks(SHARE).map(|share| {
+            let mut batch: Batch<T> = source.room(share.len());
+            for (sample, &row) in share.iter().enumerate() {
+                source.fill(&mut batch, sample, row, 0.0);
+            }
+            let bound: Vec<T> = share.iter().map(|&row| T::of(self.bounds.bound(row))).collect();
             let draw = |k: usize, sample: usize, out: &mut [T]| {
-                let tick = step * rows as u64 + (first + sample) as u64;
+                let tick = step * rows as u64 + share[sample] as u64;
                 stream::fill_normal(noise, stream::PERTURBATION + k as u32, tick, out);
             };
             let inputs = (&batch.state, &batch.kappa[..], &batch.action);
-            let mut tape = critic.tape(margins.len());
-            let mut margin = vec![T::zero(); margins.len()];
-            self.counterfactual.margins((critic, parameters), inputs, &bound, &draw, &mut tape, &mut margin);
-            for (out, margin) in margins.iter_mut().zip(margin) {
-                *out = margin.to_f64() as f32;
-            }
+            let mut tape = critic.0.tape(share.len());
+            let mut margin = vec![T::zero(); share.len()];
+            self.counterfactual.margins(critic, inputs, &bound, &draw, &mut tape, &mut margin);
+            margin
         });
-        for mini_batch in stream::shuffled(rows, noise, step).chunks(self.mini_batch) {
-            self.counterfactual.update(&margins, mini_batch, counterfactual);
+        let found: Vec<Vec<T>> = shares.collect();
+        let mut margins = vec![0.0; rows];
+        for (&row, margin) in ascending.iter().zip(found.into_iter().flatten()) {
+            margins[row] = margin.to_f64() as f32;
         }
-        self.restore(counterfactual);
+        margins
     }
 }
 
-/// The configured beta of Eq. 6, or the one that gives feasible trajectories the configured mass.
+/// 0 where trajectories are not weighted, else the configured beta of Eq. 6, or the one that gives feasible trajectories the configured mass.
 fn beta(config: &Config, data: &Dataset) -> f64 {
+    if !config.reweight.trajectory() {
+        return 0.0;
+    }
     if config.feasible_mass == 0.0 {
         return config.beta;
     }
@@ -138,27 +176,4 @@ fn sigma(config: &Config, data: &Dataset) -> Vec<f64> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::config::Preset;
-    use crate::testing::dataset;
-
-    #[test]
-    fn a_feasible_mass_replaces_beta() {
-        let mut config = Preset::Paper.config("own", 1.0);
-        assert_eq!(beta(&config, &dataset()), 0.5);
-        // One of the two trajectories is feasible, so a mass of 0.8 is 1 + beta = 4.
-        config.feasible_mass = 0.8;
-        assert!((beta(&config, &dataset()) - 3.0).abs() < 1e-12);
-    }
-
-    #[test]
-    fn sigma_counts_in_deviations_where_asked() {
-        let mut config = Preset::Paper.config("own", 1.0);
-        assert_eq!(sigma(&config, &dataset()), [0.1]);
-        config.sigma_per_entry = true;
-        // The actions are 0.1 .. 0.6.
-        let expected = 0.1 * 0.1 * (35.0f64 / 12.0).sqrt();
-        assert!((sigma(&config, &dataset())[0] - expected).abs() < 1e-8);
-    }
-}
+mod tests;

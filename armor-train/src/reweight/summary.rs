@@ -6,8 +6,7 @@ use crate::data::Sorted;
 /// How the weights are spread over the data.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct WeightSummary {
-    /// Share of transitions with `w_cf > 1`. A moving average forgets slowly,
-    /// so this counts whoever was active at any of the last refreshes.
+    /// Share of transitions that the last refresh raised (Eq. 8).
     pub active: f64,
     /// `w` (Eq. 10) at the quantiles [`WeightSummary::QUANTILES`].
     pub quantiles: [f64; 7],
@@ -19,12 +18,8 @@ impl WeightSummary {
 
     /// Counts all weights.
     pub fn new(weights: &Weights) -> Self {
-        let active = weights.counterfactual.iter().filter(|&&weight| weight > 1.0).count();
         let sorted = Sorted::new(weights.combined.iter().map(|&weight| f64::from(weight)));
-        Self {
-            active: active as f64 / weights.counterfactual.len() as f64,
-            quantiles: Self::QUANTILES.map(|q| sorted.quantile(q)),
-        }
+        Self { active: weights.active, quantiles: Self::QUANTILES.map(|q| sorted.quantile(q)) }
     }
 }
 
@@ -33,14 +28,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn activity_is_that_of_the_counterfactual_weights_and_quantiles_are_of_the_combined() {
+    fn activity_is_that_of_the_last_refresh_and_quantiles_are_of_the_combined() {
         let weights = Weights {
             trajectory: vec![1.0; 5],
             counterfactual: vec![1.0, 1.0, 1.0, 1.5, 1.0],
             combined: vec![5.0, 1.0, 2.0, 3.0, 4.0],
+            active: 0.4,
         };
         let summary = WeightSummary::new(&weights);
-        assert_eq!(summary.active, 0.2);
+        assert_eq!(summary.active, 0.4);
         let expected = [1.0, 1.4, 3.0, 4.6, 4.8, 4.96, 5.0];
         for (quantile, expected) in summary.quantiles.iter().zip(expected) {
             assert!((quantile - expected).abs() < 1e-12);

@@ -125,8 +125,8 @@ impl fmt::Display for Alarm {
 pub(super) struct Alarms {
     /// Largest data-supported `|Q_r|` and `|Q_cL|`.
     largest: [f64; 2],
-    /// Steps after which two refreshes of the weights are done.
-    two_refreshes: u64,
+    /// Steps after which two refreshes of the counterfactual weights are done; none where they are off.
+    two_refreshes: Option<u64>,
     limit: f64,
     max_kappa: f64,
     /// The largest lambda.
@@ -142,7 +142,10 @@ impl Alarms {
         let cost = provenance.cost_to_go.largest().max(config.cost_scale);
         Self {
             largest: [reward, cost],
-            two_refreshes: config.reweight_warmup.max(config.critic_steps).saturating_add(config.reweight_interval),
+            two_refreshes: config
+                .reweight
+                .counterfactual()
+                .then(|| config.reweight_warmup.max(config.critic_steps).saturating_add(config.reweight_interval)),
             limit: config.limit,
             max_kappa: provenance.max_kappa,
             cap: config.log_lambda_max.exp(),
@@ -159,8 +162,9 @@ impl Alarms {
         self.explosion(row, step, Cause::CostCritic, "Q_cL", ["q_long_cost_min", "q_long_cost_max"], self.largest[1]);
         self.lambda(row, step);
         let active = value(row, "counterfactual_active");
-        if step > self.two_refreshes && active < DEAD_SHARE {
-            let finding = format!("only {:.2} % of the transitions have one above 1", 100.0 * active);
+        if self.two_refreshes.is_some_and(|steps| step > steps) && active < DEAD_SHARE {
+            let finding =
+                format!("only {:.2} % of the transitions have one that the last refresh raised", 100.0 * active);
             self.raise(step, Cause::DeadWeights, finding);
         }
         &self.raised[before..]

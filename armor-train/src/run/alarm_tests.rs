@@ -76,6 +76,17 @@ fn weights_are_called_dead_only_after_two_refreshes() {
 }
 
 #[test]
+fn weights_that_are_off_are_not_dead() {
+    for reweight in ["off", "trajectory"] {
+        let mut config = Preset::Paper.config("test", 4.0);
+        config.set(&format!("reweight={reweight}")).unwrap();
+        let data = recording(2, 3, |_| 1.0, |_| 1.0);
+        let mut alarms = Alarms::new(&config, &Provenance::new(&config, &data));
+        assert_eq!(alarms.look(&row(&[("step", 1e5), ("counterfactual_active", 0.0)])), [], "{reweight}");
+    }
+}
+
+#[test]
 fn data_without_cost_leaves_the_cost_critic_its_noise() {
     let config = Preset::Paper.config("test", 4.0);
     let data = recording(1, 3, |_| 0.0, |_| 0.0);

@@ -11,7 +11,7 @@ use crate::config::Config;
 use crate::learner::LearnerState;
 
 /// The first bytes of a checkpoint, with its version.
-const MAGIC: &[u8; 8] = b"ARMRCK02";
+const MAGIC: &[u8; 8] = b"ARMRCK03";
 const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
 
 /// A run at one moment.
@@ -73,8 +73,13 @@ mod tests {
         (config.hidden, config.trunk, config.head, config.dual_hidden) = (4, 4, 4, 4);
         let parameters = Model::new(&config, 3, 2).initialise(Noise::new(1));
         let optimisers = Optimisers::new(&config, &parameters);
-        let state =
-            LearnerState { step: 7, parameters, optimisers, counterfactual: vec![1.0, 1.5], actor_average: Vec::new() };
+        let state = LearnerState {
+            step: 7,
+            parameters,
+            optimisers,
+            counterfactual: vec![1.0, 1.5],
+            counterfactual_active: 0.5,
+        };
         Checkpoint { config, data_sha256: [3; 32], state, window: Window::default() }
     }
 

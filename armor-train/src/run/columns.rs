@@ -99,7 +99,7 @@ pub const COLUMNS: &[Column] = &[
     column(
         "counterfactual_active",
         SHARE,
-        "transitions with a counterfactual weight above 1 (Eq. 9), active at any of the last refreshes",
+        "transitions with a margin above 0 (Eq. 8), which the last refresh of counterfactual weights raised",
         |r| r.weights.active,
     ),
     column(

@@ -37,6 +37,9 @@ use crate::run::COLUMNS;
 pub use score::{Flown, Score};
 pub use table::{Row, markdown};
 
+/// The variants of the paper's ablation (section 4.5).
+pub const ABLATION: &str = include_str!("../../studies/ablation.toml");
+
 /// A study as its file says it.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -238,6 +241,21 @@ mod tests {
         assert_eq!(seen, expected);
         assert!(
             runs.iter().all(|run| run.config.steps == 10 && run.config.limit == 5.0 && run.config.data == "x.hdf5")
+        );
+    }
+
+    /// Each differs from the full method, and from every other.
+    #[test]
+    fn the_papers_ablation_has_eight_variants_that_differ() {
+        let study = parse(ABLATION).unwrap();
+        assert_eq!(study.variants.len(), 8);
+        let configs: Vec<_> = study.variants.iter().map(|variant| study.config(variant, "x", 0).unwrap()).collect();
+        for (place, config) in configs.iter().enumerate() {
+            assert!(!configs[..place].contains(config), "{}", study.variants[place].name);
+        }
+        assert_eq!(
+            configs[7],
+            crate::config::Config { data: "x".to_owned(), ..crate::config::Preset::Quick.config("ball-run", 5.0) }
         );
     }
 

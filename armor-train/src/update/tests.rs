@@ -26,6 +26,7 @@ fn workers(model: &Model) -> Vec<Worker<f64>> {
         worker.batch.action = DMatrix::from_vec(2, 3, fill(6, stream + 3));
         worker.batch.reward = fill(3, stream + 4);
         worker.batch.weight.fill(1.0);
+        worker.batch.alive.fill(1.0);
         worker.cloning = DMatrix::from_vec(2, 3, fill(6, stream + 5));
         worker
     };
@@ -68,4 +69,27 @@ fn decay_draws_the_dual_towards_zero_weights() {
     for ((with, without), parameter) in with.iter().zip(without).zip(parameters.dual) {
         assert!((with - without - parameter).abs() < 1e-12);
     }
+}
+
+/// Actor and critic after one update of each, the copies of both far from what learns.
+fn after(options: &[&str]) -> [Vec<f64>; 2] {
+    let config = config(&[&["actor_average=0.9"], options].concat());
+    let model = Model::new(&config, 3, 2);
+    let mut parameters: Parameters<f64> = model.initialise(Noise::new(1));
+    parameters.target = fill(parameters.target.len(), 7);
+    parameters.actor_average = fill(parameters.actor.len(), 8);
+    let mut optimisers = Optimisers::new(&config, &parameters);
+    let mut workers = workers(&model);
+    update_critic(&model, &mut parameters, &mut optimisers, &mut workers, &draw, &pcgrad::orders([0; 3]));
+    let critic = parameters.critic.clone();
+    update_actor(&model, &mut parameters, &mut optimisers, &mut workers, &draw);
+    [parameters.actor, critic]
+}
+
+#[test]
+fn targets_and_judgements_come_from_the_copies_that_are_asked_for() {
+    let [actor, critic] = after(&[]);
+    let [other_actor, same_critic] = after(&["policy_critic=target"]);
+    assert!(actor != other_actor && critic == same_critic);
+    assert_ne!(after(&["target_actor=average"])[1], critic);
 }

@@ -7,7 +7,7 @@ use std::ops::Range;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::thread::{self, JoinHandle};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use armor_core::image::PolicyImage;
 use serde::Deserialize;
@@ -19,6 +19,8 @@ use crate::link::{HostEndpoint, Served, patient_socket, serve};
 
 /// What a simulator has for its next request; a reset takes at most seconds.
 const PATIENCE: Duration = Duration::from_secs(60);
+/// What a simulator has to load and connect; seconds, where nothing is wrong.
+const START: Duration = Duration::from_secs(180);
 /// Time between looks at whether a simulator has connected.
 const GLANCE: Duration = Duration::from_millis(5);
 
@@ -119,6 +121,7 @@ impl Simulator {
     /// Waits until the simulator connects; none where it ends before that.
     fn connection(&mut self, listener: &TcpListener) -> io::Result<Option<TcpStream>> {
         listener.set_nonblocking(true)?;
+        let started = Instant::now();
         loop {
             match listener.accept() {
                 Ok((socket, _)) => {
@@ -130,6 +133,9 @@ impl Simulator {
             }
             if self.child.try_wait()?.is_some() {
                 return Ok(None);
+            }
+            if started.elapsed() > START {
+                return Err(ErrorKind::TimedOut.into());
             }
             thread::sleep(GLANCE);
         }

@@ -1,0 +1,104 @@
+//! What the options of reweighting do to the weights.
+
+use super::*;
+use crate::config::Preset;
+use crate::critic::Task;
+use crate::data::Sorted;
+use crate::model::Model;
+use crate::normaliser::Normaliser;
+use crate::reweight::WeightSummary;
+use crate::testing::{dataset, fill, recording};
+
+/// The weights after a refresh by a random critic, and the share that it raised.
+fn refreshed(options: &[&str]) -> (Weights, f64) {
+    let data = recording(4, 30, |_| 0.0, |row| if row < 60 { 0.0 } else { 1.0 });
+    let mut config = Preset::Paper.config("own", 1.0);
+    let small = [
+        "trunk=8",
+        "head=8",
+        "batch=16",
+        "sigma=1",
+        "counterfactual_reference=realised",
+        "counterfactual_tolerance=0.3",
+    ];
+    small.iter().chain(options).for_each(|option| config.set(option).unwrap());
+    let model = Model::new(&config, 2, 1);
+    let critic = fill(model.critic.size(), 3);
+    let normaliser = Normaliser::new(&data, false);
+    // Half of the transitions without a cost to come lie above the bound, half below.
+    let mut batch: Batch<f64> = Source::new(&config, &data, &normaliser).room(60);
+    (0..60).for_each(|row| Source::new(&config, &data, &normaliser).fill(&mut batch, row, row, 0.0));
+    let mut tape = model.critic.tape(60);
+    let recorded = (&batch.state, &batch.kappa[..], &batch.action);
+    model.critic.forward(&critic, &[Task::ShortCost], recorded, &mut tape, false);
+    config.counterfactual_tolerance = Sorted::new(tape.pessimistic(Task::ShortCost)).quantile(0.5);
+
+    let mut reweighting = Reweighting::new(&config, &data);
+    let mut counterfactual = vec![1.0; data.len()];
+    let source = Source::new(&config, &data, &normaliser);
+    let critic = (&model.critic, &critic[..]);
+    let active = reweighting.refresh(&source, critic, (Noise::new(1), 0), &mut counterfactual);
+    (reweighting.weights, active)
+}
+
+#[test]
+fn each_scale_can_be_off_alone() {
+    let moves = |weights: &[f32]| weights.iter().any(|weight| *weight != weights[0]);
+    for (reweight, trajectory, transition) in
+        [("both", true, true), ("trajectory", true, false), ("counterfactual", false, true)]
+    {
+        let (weights, active) = refreshed(&[&format!("reweight={reweight}")]);
+        assert_eq!(moves(&weights.trajectory), trajectory, "{reweight}");
+        assert_eq!((moves(&weights.counterfactual), active > 0.0), (transition, transition), "{reweight}");
+        assert!(moves(&weights.combined), "{reweight}");
+    }
+    let mut config = Preset::Paper.config("own", 1.0);
+    config.reweight = Scales::Off;
+    let reweighting = Reweighting::new(&config, &dataset());
+    assert!(!(0..100_000).any(|step| reweighting.is_due(step)));
+    assert_eq!(reweighting.refreshes(u64::MAX), 0);
+}
+
+#[test]
+fn activity_is_the_share_with_a_margin_at_this_refresh() {
+    let (weights, active) = refreshed(&[]);
+    // All weights were 1 before.
+    let raised = weights.counterfactual.iter().filter(|weight| **weight > 1.0).count();
+    assert_eq!(active, raised as f64 / 120.0);
+    assert_eq!(WeightSummary::new(&weights).active, active);
+}
+
+#[test]
+fn a_refresh_may_look_at_a_share_of_the_data() {
+    let [all, (part, active)] = [refreshed(&[]), refreshed(&["refresh_share=0.25"])];
+    let raised = part.counterfactual.iter().filter(|weight| **weight > 1.0).count();
+    assert!(raised > 0 && raised <= 30 && active < all.1);
+}
+
+/// Eq. 9 divides by the mean margin of each mini-batch, or of all.
+#[test]
+fn margins_have_their_mean_over_a_mini_batch_or_the_data() {
+    let [batch, data] = ["batch", "data"].map(|mean| refreshed(&[&format!("margin_mean={mean}"), "weight_max=100"]).0);
+    assert_ne!(batch.counterfactual, data.counterfactual);
+    let excess = data.counterfactual.iter().map(|weight| f64::from(weight - 1.0) / 0.3).sum::<f64>();
+    assert!((excess / 120.0 - 1.0).abs() < 1e-2, "m / E[m] has mean 1 over the data");
+}
+
+#[test]
+fn a_feasible_mass_replaces_beta() {
+    let mut config = Preset::Paper.config("own", 1.0);
+    assert_eq!(beta(&config, &dataset()), 0.5);
+    // One of the two trajectories is feasible, so a mass of 0.8 is 1 + beta = 4.
+    config.feasible_mass = 0.8;
+    assert!((beta(&config, &dataset()) - 3.0).abs() < 1e-12);
+}
+
+#[test]
+fn sigma_counts_in_deviations_where_asked() {
+    let mut config = Preset::Paper.config("own", 1.0);
+    assert_eq!(sigma(&config, &dataset()), [0.1]);
+    config.sigma_per_entry = true;
+    // The actions are 0.1 .. 0.6.
+    let expected = 0.1 * 0.1 * (35.0f64 / 12.0).sqrt();
+    assert!((sigma(&config, &dataset())[0] - expected).abs() < 1e-8);
+}
