@@ -50,7 +50,6 @@ pub(super) fn multiply_panel<T: Scalar>(
     update: Update,
     multiply_add: impl Fn(T, T, T) -> T + Copy,
 ) {
-    let height = ROWS.min(rows - first);
     for (group, out) in out.chunks_mut(rows * COLUMNS).enumerate() {
         let at = group * COLUMNS;
         let sums = if !b.is_transposed() {
@@ -68,12 +67,21 @@ pub(super) fn multiply_panel<T: Scalar>(
             tile(panel, rows, multiply_add)
         };
         for (out, sums) in out.chunks_exact_mut(rows).zip(&sums) {
-            let out = &mut out[first..first + height];
-            match update {
-                Update::Replace => out.iter_mut().zip(sums).for_each(|(out, &sum)| *out = sum),
-                Update::Add => out.iter_mut().zip(sums).for_each(|(out, &sum)| *out += sum),
+            // A whole panel's height is known when this is compiled.
+            match out[first..].first_chunk_mut::<ROWS>() {
+                Some(out) => store(out, sums, update),
+                None => store(&mut out[first..], sums, update),
             }
         }
+    }
+}
+
+/// Puts the sums of a column in their place.
+#[inline(always)]
+fn store<T: Scalar>(out: &mut [T], sums: &[T; ROWS], update: Update) {
+    match update {
+        Update::Replace => out.iter_mut().zip(sums).for_each(|(out, &sum)| *out = sum),
+        Update::Add => out.iter_mut().zip(sums).for_each(|(out, &sum)| *out += sum),
     }
 }
 
