@@ -13,7 +13,7 @@ mod serve;
 
 pub use client::{Client, ClientError};
 pub use line::{PatientPipe, patient_socket};
-pub use serve::{HostEndpoint, Served, serve};
+pub use serve::{HostEndpoint, ServeError, Served, serve};
 
 use armor_infer::link::{answer_bytes, frame_bytes, request_bytes};
 
