@@ -18,6 +18,7 @@ pub mod actor;
 pub mod batch;
 pub mod calibrate;
 pub mod cli;
+pub mod collect;
 pub mod config;
 pub mod critic;
 pub mod data;

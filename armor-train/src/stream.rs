@@ -21,6 +21,10 @@ pub(crate) const BUDGET: u32 = 7;
 pub(crate) const RELABEL: u32 = 8;
 /// Leniency that a sample is cloned under; the tick is the training step.
 pub(crate) const LENIENCY: u32 = 9;
+/// Driving style of a collected trajectory, and its start; the tick is the trajectory.
+pub(crate) const STYLE: u32 = 13;
+/// Noise on collected actions; the tick is the control step.
+pub(crate) const DRIVING: u32 = 14;
 /// Noise of behaviour cloning; the tick is the sample (step times batch, plus its place).
 pub(crate) const CLONING: u32 = 6;
 /// Chain of the next actions, one stream a stage; the tick is the sample.

@@ -5,8 +5,10 @@ use std::path::{Path, PathBuf};
 use armor_core::units::CostLimit;
 use firmware_sim::calibrate::{Calibration, CalibrationReport, Transition};
 use firmware_sim::cli::output::{CommandResult, Output};
+use firmware_sim::file;
 use firmware_sim::task::Task;
 
+use crate::collect::collect;
 use crate::config::Preset;
 use crate::data::{self, Dataset, Stats};
 
@@ -23,6 +25,24 @@ pub(super) enum Data {
         /// Weight of feasible trajectories (Eq. 6), for the mass they get.
         #[arg(long, default_value_t = Preset::Paper.config("", 0.0).beta, value_parser = beta)]
         beta: f64,
+    },
+    /// Record a native plant under many driving styles, good and bad.
+    ///
+    /// The recording is thinned towards the paper's Table 1. The same seed
+    /// records the same file.
+    Collect {
+        /// The native task.
+        #[arg(long, value_parser = Task::named)]
+        task: &'static Task,
+        /// The HDF5 file to write, in the DSRL layout.
+        #[arg(long, value_name = "FILE")]
+        out: PathBuf,
+        /// Trajectories; those of Table 1, if not given.
+        #[arg(long, value_name = "N", value_parser = trajectories)]
+        trajectories: Option<usize>,
+        /// Decides styles, starts and noise.
+        #[arg(long, default_value_t = 0)]
+        seed: u64,
     },
     /// Name every fault of a file.
     Check {
@@ -46,6 +66,12 @@ impl Data {
                 let data = read(&file, output)?;
                 output.report(&Stats::new(&data, limit, beta))
             }
+            Self::Collect { task, out, trajectories, seed } => {
+                let recording = collect(task, trajectories, seed)?;
+                file::write(&out, &data::to_hdf5(&recording)?)?;
+                let beta = Preset::Paper.config("", 0.0).beta;
+                output.report(&Stats::new(&read(&out, output)?, CostLimit::new(task.cost_limit)?, beta))
+            }
             Self::Check { file } => {
                 let report = data::check(&file);
                 output.report(&report)?;
@@ -64,6 +90,11 @@ impl Data {
 /// A weight of feasible trajectories as an argument.
 fn beta(text: &str) -> Result<f64, &'static str> {
     text.parse().ok().filter(|beta| (0.0..f64::INFINITY).contains(beta)).ok_or("it must be a number of at least 0")
+}
+
+/// A number of trajectories as an argument.
+fn trajectories(text: &str) -> Result<usize, &'static str> {
+    text.parse().ok().filter(|count| (1..=1_000_000).contains(count)).ok_or("it must be between 1 and 1000000")
 }
 
 /// Reads a file, and tells what is odd about it.

@@ -22,6 +22,7 @@ mod recording;
 mod sorted;
 mod stats;
 mod togo;
+mod writer;
 
 pub use check::{Report, Warning, check};
 pub use dataset::{Dataset, Trajectory};
@@ -32,3 +33,4 @@ pub use recording::Recording;
 pub(crate) use sorted::Sorted;
 pub use stats::{Stats, feasible_mass};
 pub use togo::ToGo;
+pub use writer::to_hdf5;

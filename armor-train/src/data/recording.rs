@@ -39,6 +39,17 @@ pub struct Recording {
 }
 
 impl Recording {
+    /// Adds the rows of another recording of the same sizes.
+    pub fn append(&mut self, other: &Self) {
+        self.observations.extend_from_slice(&other.observations);
+        self.next_observations.extend_from_slice(&other.next_observations);
+        self.actions.extend_from_slice(&other.actions);
+        self.rewards.extend_from_slice(&other.rewards);
+        self.costs.extend_from_slice(&other.costs);
+        self.terminals.extend_from_slice(&other.terminals);
+        self.timeouts.extend_from_slice(&other.timeouts);
+    }
+
     /// Reads a file whole.
     ///
     /// # Errors

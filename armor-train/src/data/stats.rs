@@ -115,12 +115,12 @@ impl fmt::Display for Stats {
         line("nu_beta(F)", format!("{:.3}", self.feasible_mass), &meaning)?;
         let best = self.best_feasible_return.map_or("none".to_owned(), |best| format!("{best:.1}"));
         line("best feasible return", best, "")?;
-        let mut row = |name: &str, columns: [(&str, f64); 4]| {
+        let mut row = |name: &str, columns: [(&str, f64); 4], end: &str| {
             write!(f, "{name:<15}")?;
             for (column, value) in columns {
                 write!(f, "{column:>7}{value:>9.1}")?;
             }
-            writeln!(f)
+            f.write_str(end)
         };
         row(
             "reward return",
@@ -130,6 +130,7 @@ impl fmt::Display for Stats {
                 ("95 %", self.reward_return_p95),
                 ("max", self.reward_return_max),
             ],
+            "\n",
         )?;
         row(
             "cost return",
@@ -139,6 +140,7 @@ impl fmt::Display for Stats {
                 ("75 %", self.cost_return_p75),
                 ("max", self.cost_return_max),
             ],
+            "",
         )
     }
 }

@@ -16,9 +16,31 @@ fn the_shipped_recording_is_counted() {
     let plain = bench.success(&["data", "stats", &shipped(), "--limit", "5"]);
     fits_a_terminal(&plain);
     let words = text(&plain.stdout);
+    assert!(words.ends_with('\n') && !words.ends_with("\n\n"), "no empty line at the end");
     for number in ["94000", "940", "0.363", "0.130"] {
         assert!(words.split_whitespace().any(|word| word == number), "{number} in {words}");
     }
+}
+
+#[test]
+fn a_collected_recording_is_sound_and_trains() {
+    let bench = Bench::new();
+    let collect = ["data", "collect", "--task", "ball-run", "--trajectories", "20", "--out"];
+    let stats = bench.json(&[&collect[..], &["own.hdf5"]].concat());
+    assert_eq!((&stats["transitions"], &stats["trajectories"]), (&2000.into(), &20.into()));
+    fits_a_terminal(&bench.success(&[&collect[..], &["again.hdf5"]].concat()));
+    assert_eq!(bench.bytes("own.hdf5"), bench.bytes("again.hdf5"));
+    let report = bench.json(&["data", "check", "own.hdf5"]);
+    assert_eq!(report["faults"].as_array().unwrap().len(), 0, "{report}");
+    let calibration = bench.json(&["data", "calibrate", "own.hdf5", "--task", "ball-run"]);
+    assert_eq!(calibration["recorded_cost_mismatches"], 0, "the plant agrees with its own recording");
+    bench.success(&fit(["own.hdf5", "ball-run", "5"], "run", 2, &[]));
+
+    let error = bench.failure(&[&collect[..], &["no/such/folder/x.hdf5"]].concat());
+    assert!(error.contains("cannot write no/such/folder/x.hdf5"), "{error}");
+    let error = bench.failure(&["data", "collect", "--task", "SafetyAntRun-v0", "--out", "x.hdf5"]);
+    assert!(error.contains("needs its simulator"), "{error}");
+    assert!(!bench.path("x.hdf5").exists());
 }
 
 #[test]
@@ -231,6 +253,7 @@ fn help_fits_a_terminal() {
         &["data", "stats"],
         &["data", "check"],
         &["data", "calibrate"],
+        &["data", "collect"],
         &["fit"],
         &["options"],
         &["report"],
