@@ -171,3 +171,19 @@ impl fmt::Display for Report {
         write!(f, "runs and table.md   {}", self.out.display())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_variants_of_every_shipped_study_can_be_trained_and_differ() {
+        for (name, text) in SHIPPED {
+            let study = Definition::parse(Path::new(name), text).unwrap();
+            let runs = study.runs("data.hdf5").unwrap_or_else(|error| panic!("{name}: {error}"));
+            for (index, run) in runs.iter().enumerate() {
+                assert!(runs[..index].iter().all(|other| other.config != run.config), "{name}: {}", run.variant);
+            }
+        }
+    }
+}
