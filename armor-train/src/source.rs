@@ -21,6 +21,11 @@ impl<'a> Source<'a> {
         Self { config, data, normaliser }
     }
 
+    /// The transitions as recorded.
+    pub(crate) const fn data(&self) -> &Dataset {
+        self.data
+    }
+
     /// Room for `samples` transitions.
     pub(crate) fn room<T: Scalar>(&self, samples: usize) -> Batch<T> {
         Batch::zeros(self.data.state_dim(), self.data.action_dim(), samples)

@@ -16,6 +16,8 @@ mod table;
 
 use std::path::{Path, PathBuf};
 
+use armor_train::data::Dataset;
+
 /// A file of this folder's fixtures.
 fn fixture(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(name)
@@ -24,4 +26,13 @@ fn fixture(name: &str) -> PathBuf {
 /// The recording that ships with the project.
 fn shipped_file() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../data/ball-run-bullet.hdf5")
+}
+
+/// All that a data set holds but the hash, row by row: states, action, reward and cost, and the end mark.
+fn contents(dataset: &Dataset) -> Vec<([&[f32]; 3], [f32; 2], bool)> {
+    let row = |row| {
+        let vectors = [dataset.observation(row), dataset.next_observation(row), dataset.action(row)];
+        (vectors, [dataset.reward(row), dataset.cost(row)], dataset.done(row))
+    };
+    (0..dataset.len()).map(row).collect()
 }

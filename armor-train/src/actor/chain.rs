@@ -18,6 +18,7 @@ pub struct Chain<T: Scalar> {
     steps: Vec<ChainStep<f64>>,
     /// Steps at the end of the chain that are remembered.
     gradient_steps: usize,
+    /// Between passes only the last has room for gradients, which it lends to the others.
     calls: Vec<Call<T>>,
     /// 1 where the estimate `x0` of a step lay within the bounds, 0 where it was clipped.
     inside: Vec<DMatrix<T>>,
@@ -32,13 +33,9 @@ impl<T: Scalar> Chain<T> {
         let gradient_steps = gradient_steps.min(steps.len());
         let room = gradient_steps.max(1);
         let action = DMatrix::zeros(denoiser.widths().action, samples);
-        Self {
-            calls: (0..room).map(|_| denoiser.call(samples)).collect(),
-            inside: vec![action.clone(); room],
-            gradient_steps,
-            steps,
-            action,
-        }
+        let mut calls: Vec<Call<T>> = (0..room).map(|_| denoiser.call(samples)).collect();
+        calls[..room - 1].iter_mut().for_each(Call::free_gradients);
+        Self { calls, inside: vec![action.clone(); room], gradient_steps, steps, action }
     }
 
     /// Runs the chain in a prepared context; its end is [`Chain::action`].
@@ -99,7 +96,12 @@ impl<T: Scalar> Chain<T> {
     ) {
         let mut after = action_gradient.clone();
         let remembered = &self.steps[self.steps.len() - self.gradient_steps..];
-        for ((step, call), inside) in remembered.iter().zip(&mut self.calls).zip(&self.inside).rev() {
+        for (index, (step, inside)) in remembered.iter().zip(&self.inside).enumerate().rev() {
+            let (earlier, later) = self.calls.split_at_mut(index + 1);
+            let call = &mut earlier[index];
+            if let Some(later) = later.first_mut() {
+                call.swap_gradients(later);
+            }
             let [from_action, from_noise, to_x0, to_action, _] = coefficients::<T>(step);
             // The gradient with respect to the estimate; a clipped entry passes none.
             let estimate = after.component_mul(inside) * to_x0;
@@ -111,6 +113,9 @@ impl<T: Scalar> Chain<T> {
                 let mut sum = after.column_mut(sample);
                 sum += call.action_gradient.column(column);
             }
+        }
+        if let [first, .., last] = &mut self.calls[..] {
+            first.swap_gradients(last);
         }
     }
 }

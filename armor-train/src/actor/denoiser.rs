@@ -94,6 +94,18 @@ impl<T: Scalar> Call<T> {
         self.body.output()
     }
 
+    /// Frees the room of the gradients; [`Call::swap_gradients`] gives it another.
+    pub fn free_gradients(&mut self) {
+        self.hidden_gradient = DMatrix::zeros(0, 0);
+        self.body.free_gradients();
+    }
+
+    /// Exchanges the room of the gradients, which need not outlive a backward pass.
+    pub fn swap_gradients(&mut self, other: &mut Self) {
+        std::mem::swap(&mut self.hidden_gradient, &mut other.hidden_gradient);
+        self.body.swap_gradients(&mut other.body);
+    }
+
     /// Where the gradient with respect to the predicted noise is written.
     pub fn noise_gradient(&mut self) -> &mut DMatrix<T> {
         self.body.output_gradient()

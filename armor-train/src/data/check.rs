@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 
 use serde::{Serialize, Serializer};
 
+use super::columns::Columns;
 use super::dataset::Dataset;
 use super::error::Fault;
 use super::moments::StateMoments;
-use super::recording::Recording;
 
 /// What [`check`] found.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -70,10 +70,10 @@ pub enum Warning {
 /// cannot.
 pub fn check(path: &Path) -> Report {
     let file = path.to_owned();
-    match Recording::read_or_faults(path) {
+    match Columns::read(path) {
         Err(faults) => Report { file, transitions: 0, trajectories: 0, faults, warnings: Vec::new() },
-        Ok(recording) => {
-            let dataset = Dataset::from_valid(recording);
+        Ok(columns) => {
+            let dataset = Dataset::split(columns);
             Report {
                 file,
                 transitions: dataset.len(),

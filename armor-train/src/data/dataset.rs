@@ -1,28 +1,27 @@
 //! A recording made ready for training: trajectories, kappa, clipped actions.
 
+use std::io::{Read, Seek};
 use std::ops::Range;
 use std::path::Path;
 
+use super::columns::Columns;
 use super::error::{DataError, Fault};
 use super::recording::Recording;
+use super::states::States;
 
 /// Transitions of whole trajectories, addressed by row `0 .. len()`.
 ///
 /// An accessor that takes a row panics beyond `len()`, as indexing a slice does.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Dataset {
-    state_dim: usize,
+    /// Of all rows of the recording, also of those that were dropped.
+    states: States,
     action_dim: usize,
     sha256: [u8; 32],
-    /// Every state that occurs, once: a trajectory's first, then what followed each step.
-    states: Vec<f32>,
-    /// Where in `states`, counted in states, a row's observation is; the state after it is its next.
-    position: Vec<usize>,
     actions: Vec<f32>,
     rewards: Vec<f32>,
     costs: Vec<f32>,
     kappas: Vec<f32>,
-    trajectory_of: Vec<usize>,
     trajectories: Vec<Trajectory>,
     unfinished: usize,
 }
@@ -44,7 +43,15 @@ impl Dataset {
     /// # Errors
     /// [`DataError`] with the first [`Fault`] of the file.
     pub fn read(path: &Path) -> Result<Self, DataError> {
-        Recording::read(path).map(Self::from_valid)
+        Columns::read(path).map(Self::split).map_err(|faults| DataError { file: path.to_owned(), fault: first(faults) })
+    }
+
+    /// Reads the bytes of an HDF5 file, a part at a time, and makes them ready.
+    ///
+    /// # Errors
+    /// The first [`Fault`].
+    pub fn from_reader(reader: impl Read + Seek + Send + 'static) -> Result<Self, Fault> {
+        Columns::from_reader(reader).map(Self::split).map_err(first)
     }
 
     /// Makes a recording ready.
@@ -52,15 +59,13 @@ impl Dataset {
     /// # Errors
     /// The first [`Fault`] of the recording.
     pub fn new(recording: Recording) -> Result<Self, Fault> {
-        recording.validate()?;
-        Ok(Self::from_valid(recording))
+        recording.into_columns().map(Self::split)
     }
 
     /// Splits at terminal or timeout (O-3) and drops what follows the last end (O-1).
-    pub(super) fn from_valid(recording: Recording) -> Self {
-        let Recording { state_dim, action_dim, mut actions, mut rewards, mut costs, sha256, .. } = recording;
-        let ends = recording.terminals.iter().zip(&recording.timeouts).map(|(&terminal, &timeout)| terminal || timeout);
-        let ends: Vec<usize> = ends.enumerate().filter_map(|(row, end)| end.then_some(row + 1)).collect();
+    pub(super) fn split(columns: Columns) -> Self {
+        let Columns { states, action_dim, mut actions, mut rewards, mut costs, ends, sha256 } = columns;
+        let ends: Vec<usize> = ends.iter().enumerate().filter_map(|(row, &end)| end.then_some(row + 1)).collect();
         let rows = ends.last().copied().unwrap_or(0);
         let unfinished = rewards.len() - rows;
         rewards.truncate(rows);
@@ -70,43 +75,16 @@ impl Dataset {
             *action = action.clamp(-1.0, 1.0); // O-4
         }
 
-        let mut dataset = Self {
-            state_dim,
-            action_dim,
-            sha256,
-            states: Vec::with_capacity((rows + ends.len()) * state_dim),
-            position: Vec::with_capacity(rows),
-            actions,
-            rewards,
-            kappas: vec![0.0; rows],
-            costs,
-            trajectory_of: Vec::with_capacity(rows),
-            trajectories: Vec::with_capacity(ends.len()),
-            unfinished,
-        };
+        let trajectories = Vec::with_capacity(ends.len());
+        let kappas = vec![0.0; rows];
+        let mut dataset =
+            Self { states, action_dim, sha256, actions, rewards, costs, kappas, trajectories, unfinished };
         let mut start = 0;
         for end in ends {
-            dataset.push_states(start..end, &recording.observations, &recording.next_observations);
             dataset.push_trajectory(start..end);
             start = end;
         }
         dataset
-    }
-
-    /// Stores a trajectory's states; a next state that is the next row's state bit for bit, once.
-    fn push_states(&mut self, rows: Range<usize>, observations: &[f32], next_observations: &[f32]) {
-        let dim = self.state_dim;
-        for row in rows.clone() {
-            let entries = row * dim..(row + 1) * dim;
-            let here = &observations[entries.clone()];
-            // Behind the trajectory's first row, the last state stored is what followed the row before.
-            let follows = row > rows.start && same_bits(here, &self.states[self.states.len() - dim..]);
-            if !follows {
-                self.states.extend_from_slice(here);
-            }
-            self.position.push(self.states.len() / dim - 1);
-            self.states.extend_from_slice(&next_observations[entries]);
-        }
     }
 
     /// `kappa_t = sum of c_k, k >= t` (section 3.1), summed in f64 so that it is exact for whole costs.
@@ -116,7 +94,6 @@ impl Dataset {
             kappa += f64::from(self.costs[row]);
             self.kappas[row] = kappa as f32;
         }
-        self.trajectory_of.resize(rows.end, self.trajectories.len());
         self.trajectories.push(Trajectory {
             reward_return: self.rewards[rows.clone()].iter().map(|&reward| f64::from(reward)).sum(),
             cost_return: kappa as f32,
@@ -136,7 +113,7 @@ impl Dataset {
 
     /// Entries of a state, `S`.
     pub fn state_dim(&self) -> usize {
-        self.state_dim
+        self.states.width()
     }
 
     /// Entries of an action, `A`.
@@ -166,12 +143,12 @@ impl Dataset {
 
     /// `s_t`, of length `S`.
     pub fn observation(&self, row: usize) -> &[f32] {
-        self.state(self.position[row])
+        self.states.observation(row)
     }
 
     /// `s_{t+1}`, of length `S`, as recorded.
     pub fn next_observation(&self, row: usize) -> &[f32] {
-        self.state(self.position[row] + 1)
+        self.states.next_observation(row)
     }
 
     /// `a_t`, of length `A`, clipped to `[-1, 1]` (O-4).
@@ -203,30 +180,28 @@ impl Dataset {
 
     /// Whether the trajectory ends with this row, by terminal or timeout (O-3).
     pub fn done(&self, row: usize) -> bool {
-        self.trajectories[self.trajectory_of[row]].rows.end == row + 1
+        self.trajectories[self.trajectory(row)].rows.end == row + 1
     }
 
     /// Index of the row's trajectory in [`Dataset::trajectories`].
     pub fn trajectory(&self, row: usize) -> usize {
-        self.trajectory_of[row]
+        self.trajectories.partition_point(|trajectory| trajectory.rows.end <= row)
     }
 
     /// `C_i` of the row's trajectory.
     pub fn trajectory_cost(&self, row: usize) -> f32 {
-        self.trajectories[self.trajectory_of[row]].cost_return
+        self.trajectories[self.trajectory(row)].cost_return
     }
 
     /// Rows whose next observation is not the observation of the row after it, though the
     /// trajectory goes on.
     pub fn gaps(&self) -> impl Iterator<Item = usize> {
-        (0..self.len()).filter(|&row| !self.done(row) && self.position[row + 1] != self.position[row] + 1)
-    }
-
-    fn state(&self, index: usize) -> &[f32] {
-        &self.states[index * self.state_dim..(index + 1) * self.state_dim]
+        let kept = self.states.breaks().iter().copied().take_while(|&row| row < self.len());
+        kept.filter(|&row| !self.done(row))
     }
 }
 
-fn same_bits(a: &[f32], b: &[f32]) -> bool {
-    a.iter().map(|x| x.to_bits()).eq(b.iter().map(|x| x.to_bits()))
+/// The fault to name where only one is; an error always carries one.
+fn first(faults: Vec<Fault>) -> Fault {
+    faults.into_iter().next().unwrap_or(Fault::Empty)
 }

@@ -1,5 +1,6 @@
 //! Why a recording cannot be used.
 
+use std::io;
 use std::path::PathBuf;
 
 use armor_core::units::Cost;
@@ -154,6 +155,15 @@ pub enum Fault {
         /// Rows of the recording.
         rows: usize,
     },
+}
+
+impl From<io::Error> for Fault {
+    fn from(error: io::Error) -> Self {
+        match error.kind() {
+            io::ErrorKind::NotFound => Self::NotFound,
+            _ => Self::Unreadable { reason: error.to_string() },
+        }
+    }
 }
 
 /// Names from a file, quoted, for a message.

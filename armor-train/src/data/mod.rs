@@ -1,8 +1,8 @@
 //! Recorded data in the DSRL layout: read, checked, counted, and made ready for training.
 //!
 //! ```text
-//! file --hdf5--> Recording --dataset--> Dataset --stats--> Table 1
-//!      \--check--> every fault and warning
+//! file --hdf5--> Columns --dataset--> Dataset --stats--> Table 1
+//!    Recording --/ \--check--> every fault and warning
 //! ```
 //!
 //! Bytes are checked once: whatever a [`Dataset`] holds is finite, costs are at
@@ -13,13 +13,16 @@
 //! still to come in it.
 
 mod check;
+mod columns;
 mod dataset;
 mod error;
 mod hdf5;
 mod key;
 mod moments;
 mod recording;
+mod scan;
 mod sorted;
+mod states;
 mod stats;
 mod togo;
 mod writer;

@@ -5,7 +5,7 @@ use hdf5_pure::FileBuilder;
 use super::key::Key;
 use super::recording::Recording;
 
-/// The bytes of an HDF5 file that [`Recording::from_bytes`] reads back; flags are one byte each.
+/// The bytes of an HDF5 file that [`Dataset::read`](super::Dataset::read) takes; flags are one byte each.
 ///
 /// # Errors
 /// What the HDF5 library says of shapes that it cannot write.
@@ -34,7 +34,10 @@ pub fn to_hdf5(recording: &Recording) -> Result<Vec<u8>, hdf5_pure::Error> {
 
 #[cfg(test)]
 mod tests {
+    use std::io::Cursor;
+
     use super::*;
+    use crate::data::Dataset;
 
     #[test]
     fn what_is_written_is_read_back() {
@@ -50,7 +53,7 @@ mod tests {
             timeouts: vec![false, true],
             sha256: [0; 32],
         };
-        let read = Recording::from_bytes(to_hdf5(&recording).unwrap()).unwrap();
-        assert_eq!(Recording { sha256: [0; 32], ..read }, recording);
+        let read = Dataset::from_reader(Cursor::new(to_hdf5(&recording).unwrap())).unwrap();
+        assert_eq!(Dataset::new(Recording { sha256: *read.sha256(), ..recording }).unwrap(), read);
     }
 }

@@ -38,6 +38,16 @@ impl<T: Scalar> Tape<T> {
         self.deltas.last_mut().expect("an Mlp has a layer")
     }
 
+    /// Frees the room of the gradients; [`Tape::swap_gradients`] gives it another.
+    pub fn free_gradients(&mut self) {
+        self.deltas.clear();
+    }
+
+    /// Exchanges the room of the gradients, which need not outlive a backward pass.
+    pub fn swap_gradients(&mut self, other: &mut Self) {
+        std::mem::swap(&mut self.deltas, &mut other.deltas);
+    }
+
     /// Keeps these samples (ascending) for the backward pass, in the leading columns, and forgets the others.
     pub fn keep(&mut self, samples: &[usize]) {
         self.values.iter_mut().chain(&mut self.slopes).for_each(|matrix| keep_columns(matrix, samples));

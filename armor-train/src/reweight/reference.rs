@@ -20,30 +20,44 @@ pub enum Reference {
 
 /// The bound of every transition, in units of scaled cost.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Bounds(Vec<f64>);
+pub struct Bounds {
+    /// What the trajectory incurs from each row on, by [`Reference::Realised`]; empty for kappa, which the data holds.
+    realised: Vec<f64>,
+    reference: Reference,
+    tolerance: f64,
+    cost_scale: f64,
+}
 
 impl Bounds {
     /// The bounds of all transitions: the reference, plus `tolerance` in units of recorded cost.
     pub fn new(data: &Dataset, reference: Reference, discount: f64, tolerance: f64, cost_scale: f64) -> Self {
-        let mut bounds = vec![0.0; data.len()];
-        for trajectory in data.trajectories() {
-            let mut realised = 0.0;
-            for row in trajectory.rows.clone().rev() {
-                realised = f64::from(data.cost(row)) + discount * realised;
-                let reference = match reference {
-                    Reference::Kappa => f64::from(data.kappa(row)),
-                    Reference::Realised => realised,
-                };
-                bounds[row] = cost_scale * (reference + tolerance);
-            }
-        }
-        Self(bounds)
+        let realised = match reference {
+            Reference::Kappa => Vec::new(),
+            Reference::Realised => realised(data, discount),
+        };
+        Self { realised, reference, tolerance, cost_scale }
     }
 
-    /// The bound of a transition.
-    pub fn bound(&self, row: usize) -> f64 {
-        self.0[row]
+    /// The bound of a transition of the same data.
+    pub fn bound(&self, data: &Dataset, row: usize) -> f64 {
+        let reference = match self.reference {
+            Reference::Kappa => f64::from(data.kappa(row)),
+            Reference::Realised => self.realised[row],
+        };
+        self.cost_scale * (reference + self.tolerance)
     }
+}
+
+fn realised(data: &Dataset, discount: f64) -> Vec<f64> {
+    let mut sums = vec![0.0; data.len()];
+    for trajectory in data.trajectories() {
+        let mut sum = 0.0;
+        for row in trajectory.rows.clone().rev() {
+            sum = f64::from(data.cost(row)) + discount * sum;
+            sums[row] = sum;
+        }
+    }
+    sums
 }
 
 #[cfg(test)]
@@ -54,8 +68,9 @@ mod tests {
     #[test]
     fn the_paper_takes_kappa_and_the_option_the_discounted_cost_to_come() {
         let bounds = |reference| {
-            let bounds = Bounds::new(&dataset(), reference, 0.5, 0.1, 2.0);
-            [0, 1, 2, 3].map(|row| bounds.bound(row))
+            let data = dataset();
+            let bounds = Bounds::new(&data, reference, 0.5, 0.1, 2.0);
+            [0, 1, 2, 3].map(|row| bounds.bound(&data, row))
         };
         // The first trajectory costs 1, 0, 1; the second nothing.
         assert_eq!(bounds(Reference::Kappa), [2.0, 1.0, 1.0, 0.0].map(|kappa| 2.0 * (kappa + 0.1)));

@@ -127,7 +127,7 @@ impl Reweighting {
             for (sample, &row) in share.iter().enumerate() {
                 source.fill(&mut batch, sample, row, 0.0);
             }
-            let bound: Vec<T> = share.iter().map(|&row| T::of(self.bounds.bound(row))).collect();
+            let bound: Vec<T> = share.iter().map(|&row| T::of(self.bounds.bound(source.data(), row))).collect();
             let draw = |k: usize, sample: usize, out: &mut [T]| {
                 let tick = step * rows as u64 + share[sample] as u64;
                 stream::fill_normal(noise, stream::PERTURBATION + k as u32, tick, out);

@@ -14,15 +14,15 @@ use crate::learner::LearnerState;
 const MAGIC: &[u8; 8] = b"ARMRCK03";
 const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
 
-/// A run at one moment.
+/// A run at one moment; to be written, a reference to its state will do.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Checkpoint {
+pub struct Checkpoint<S = LearnerState<f32>> {
     /// The effective configuration.
     pub config: Config,
     /// SHA-256 of the recorded data.
     pub data_sha256: [u8; 32],
     /// Networks, optimisers and weights.
-    pub state: LearnerState<f32>,
+    pub state: S,
     /// Metrics since the last row of `metrics.csv`.
     pub window: Window,
 }
@@ -48,16 +48,19 @@ impl Checkpoint {
         let body = bytes.strip_prefix(MAGIC)?;
         postcard::from_bytes_crc32(body, CRC.digest()).ok()
     }
+}
 
+impl<S: Serialize> Checkpoint<S> {
     /// Writes the checkpoint, whole or not at all.
     ///
     /// # Errors
     /// [`RunError::File`]; the checkpoint before is kept then.
     pub fn write(&self, folder: &Path) -> Result<(), RunError> {
-        let path = folder.join(Self::FILE);
-        let body =
-            postcard::to_stdvec_crc32(self, CRC.digest()).map_err(|_| RunError::Checkpoint { path: path.clone() })?;
-        Ok(file::write(&path, &[&MAGIC[..], &body].concat())?)
+        let path = folder.join(Checkpoint::FILE);
+        let body = postcard::to_stdvec_crc32(self, CRC.digest());
+        let mut bytes = body.map_err(|_| RunError::Checkpoint { path: path.clone() })?;
+        bytes.splice(..0, *MAGIC);
+        Ok(file::write(&path, &bytes)?)
     }
 }
 

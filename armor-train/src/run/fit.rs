@@ -138,7 +138,7 @@ fn save(learner: &Learner<'_, f32>, data: &Dataset, window: &Window, folder: &Pa
     let checkpoint = Checkpoint {
         config: learner.config().clone(),
         data_sha256: *data.sha256(),
-        state: learner.state().clone(),
+        state: learner.state(),
         window: window.clone(),
     };
     checkpoint.write(folder)

@@ -1,15 +1,20 @@
 //! Damaged files: cut anywhere, bits flipped anywhere. Always a named fault or
-//! a sound recording, never a panic.
+//! a sound data set, never a panic.
 
 use std::fs;
+use std::io::Cursor;
 
 use armor_core::noise::{Noise, below};
-use armor_train::data::{Fault, Recording};
+use armor_train::data::{Dataset, Fault};
 
-use crate::{fixture, shipped_file};
+use crate::{contents, fixture, shipped_file};
+
+fn read(bytes: &[u8]) -> Result<Dataset, Fault> {
+    Dataset::from_reader(Cursor::new(bytes.to_vec()))
+}
 
 #[track_caller]
-fn assert_named(bytes: usize, whole: usize, result: Result<Recording, Fault>) {
+fn assert_named(bytes: usize, whole: usize, result: Result<Dataset, Fault>) {
     let (cut, expected) = (bytes as u64, whole as u64);
     match result.unwrap_err() {
         // The 8 bytes of the signature, the 96 of the superblock, the rest.
@@ -23,13 +28,13 @@ fn assert_named(bytes: usize, whole: usize, result: Result<Recording, Fault>) {
 fn a_file_cut_anywhere_is_named_as_such() {
     let small = fs::read(fixture("small.hdf5")).unwrap();
     for bytes in 0..small.len() {
-        assert_named(bytes, small.len(), Recording::from_bytes(small[..bytes].to_vec()));
+        assert_named(bytes, small.len(), read(&small[..bytes]));
     }
 
     let shipped = fs::read(shipped_file()).unwrap();
     let spread = (0..200).map(|cut| cut * shipped.len() / 200);
     for bytes in spread.chain([1, 7, 8, 95, 96, 97, 2048, shipped.len() - 1]) {
-        assert_named(bytes, shipped.len(), Recording::from_bytes(shipped[..bytes].to_vec()));
+        assert_named(bytes, shipped.len(), read(&shipped[..bytes]));
     }
 }
 
@@ -38,14 +43,14 @@ fn a_file_cut_anywhere_is_named_as_such() {
 #[test]
 fn a_file_cut_behind_the_superblocks_back_is_damaged_or_whole() {
     let small = fs::read(fixture("small.hdf5")).unwrap();
-    let whole = Recording::from_bytes(small.clone()).unwrap();
+    let whole = read(&small).unwrap();
     let mut damaged = 0;
     for bytes in 48..small.len() {
         let mut cut = small[..bytes].to_vec();
         cut[40..48].copy_from_slice(&(bytes as u64).to_le_bytes());
-        match Recording::from_bytes(cut) {
+        match read(&cut) {
             // What was cut is space that no data set uses.
-            Ok(recording) => assert_eq!(Recording { sha256: whole.sha256, ..recording }, whole),
+            Ok(dataset) => assert_eq!(contents(&dataset), contents(&whole)),
             Err(fault) => {
                 assert!(matches!(fault, Fault::Damaged { .. }), "{fault}");
                 damaged += 1;
@@ -58,7 +63,7 @@ fn a_file_cut_behind_the_superblocks_back_is_damaged_or_whole() {
 /// Old HDF5 structures and raw data carry no checksum, so a flip may read as
 /// other data; what is read must still be sound.
 #[test]
-fn a_flipped_bit_is_a_named_fault_or_a_sound_recording() {
+fn a_flipped_bit_is_a_named_fault_or_a_sound_data_set() {
     let noise = Noise::new(0);
     for name in ["small.hdf5", "small-v114.hdf5"] {
         let mut bytes = fs::read(fixture(name)).unwrap();
@@ -66,8 +71,8 @@ fn a_flipped_bit_is_a_named_fault_or_a_sound_recording() {
         for position in 0..bytes.len() {
             let flip = 1 << below(noise.words(0, position as u64, 0)[0], 8);
             bytes[position] ^= flip;
-            match Recording::from_bytes(bytes.clone()) {
-                Ok(recording) => assert_sound(&recording),
+            match read(&bytes) {
+                Ok(dataset) => assert_sound(&dataset),
                 Err(_) => faults += 1,
             }
             bytes[position] ^= flip;
@@ -77,7 +82,7 @@ fn a_flipped_bit_is_a_named_fault_or_a_sound_recording() {
 }
 
 #[test]
-fn many_overwritten_bytes_are_a_named_fault_or_a_sound_recording() {
+fn many_overwritten_bytes_are_a_named_fault_or_a_sound_data_set() {
     let small = fs::read(fixture("small.hdf5")).unwrap();
     for trial in 0..4000 {
         let mut bytes = small.clone();
@@ -85,24 +90,21 @@ fn many_overwritten_bytes_are_a_named_fault_or_a_sound_recording() {
             let [position, value, ..] = Noise::new(1).words(0, trial, block);
             bytes[below(position, small.len() as u32) as usize] = value as u8;
         }
-        if let Ok(recording) = Recording::from_bytes(bytes) {
-            assert_sound(&recording);
+        if let Ok(dataset) = read(&bytes) {
+            assert_sound(&dataset);
         }
     }
 }
 
-/// The promises of a recording that was read without a fault.
-fn assert_sound(recording: &Recording) {
-    let rows = recording.rewards.len();
-    assert!(rows > 0);
-    assert_eq!(recording.observations.len(), rows * recording.state_dim);
-    assert_eq!(recording.next_observations.len(), rows * recording.state_dim);
-    assert_eq!(recording.actions.len(), rows * recording.action_dim);
-    for column in [&recording.observations, &recording.next_observations, &recording.rewards] {
-        assert!(column.iter().all(|value| value.is_finite()));
+/// The promises of a data set that was read without a fault.
+fn assert_sound(dataset: &Dataset) {
+    assert!(!dataset.is_empty());
+    for ([observation, next, action], [reward, cost], _) in contents(dataset) {
+        assert_eq!((observation.len(), next.len()), (dataset.state_dim(), dataset.state_dim()));
+        assert_eq!(action.len(), dataset.action_dim());
+        assert!(observation.iter().chain(next).all(|value| value.is_finite()) && reward.is_finite());
+        assert!(action.iter().all(|action| action.abs() <= 1.0));
+        assert!((0.0..=65536.0).contains(&cost));
     }
-    assert!(recording.actions.iter().all(|action| action.abs() <= 1.001));
-    assert!(recording.costs.iter().all(|cost| (0.0..=65536.0).contains(cost)));
-    assert_eq!((recording.costs.len(), recording.terminals.len(), recording.timeouts.len()), (rows, rows, rows));
-    assert!(recording.terminals.iter().chain(&recording.timeouts).any(|&end| end));
+    assert!(dataset.done(dataset.len() - 1));
 }
