@@ -108,7 +108,7 @@ impl<'d, T: Scalar> Learner<'d, T> {
         let workers = shares.map(|first| Worker::new(&model, first, SHARE.min(config.batch - first))).collect();
         let mut reweighting = Reweighting::new(&config, data);
         if reweighting.refreshes(state.step) > 0 {
-            reweighting.restore(&state.counterfactual, state.counterfactual_active);
+            reweighting.restore(data, &state.counterfactual, state.counterfactual_active);
         }
         Self {
             data,

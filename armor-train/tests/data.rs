@@ -1,6 +1,8 @@
 //! Recorded data: the shipped file's numbers, every fault by a file that has
 //! it, damaged files, and what a data set makes of any recording.
 
+#[path = "data/blocks.rs"]
+mod blocks;
 #[path = "data/damage.rs"]
 mod damage;
 #[path = "data/dataset.rs"]
@@ -28,8 +30,11 @@ fn shipped_file() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../data/ball-run-bullet.hdf5")
 }
 
-/// All that a data set holds but the hash, row by row: states, action, reward and cost, and the end mark.
-fn contents(dataset: &Dataset) -> Vec<([&[f32]; 3], [f32; 2], bool)> {
+/// State, next state and action; reward and cost; the end mark.
+type Row<'a> = ([&'a [f32]; 3], [f32; 2], bool);
+
+/// All that a data set holds but the hash.
+fn contents(dataset: &Dataset) -> Vec<Row<'_>> {
     let row = |row| {
         let vectors = [dataset.observation(row), dataset.next_observation(row), dataset.action(row)];
         (vectors, [dataset.reward(row), dataset.cost(row)], dataset.done(row))

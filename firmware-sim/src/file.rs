@@ -1,6 +1,6 @@
 //! Files: written whole or not at all, and errors that name the path.
 
-use std::fs;
+use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
@@ -29,17 +29,25 @@ pub fn read(path: &Path) -> Result<Vec<u8>, FileError> {
 /// # Errors
 /// [`FileError`]; `path` is as it was then.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    write_aside(folder, path, bytes).map_err(|source| FileError { action: "write", path: path.into(), source })
+    write_with(path, |file| file.write_all(bytes))
 }
 
-fn write_aside(folder: &Path, path: &Path, bytes: &[u8]) -> io::Result<()> {
+/// As [`write`], for contents that are not held in memory: `contents` writes them part by part.
+///
+/// # Errors
+/// [`FileError`]; `path` is as it was then.
+pub fn write_with(path: &Path, contents: impl FnOnce(&mut File) -> io::Result<()>) -> Result<(), FileError> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    write_aside(folder, path, contents).map_err(|source| FileError { action: "write", path: path.into(), source })
+}
+
+fn write_aside(folder: &Path, path: &Path, contents: impl FnOnce(&mut File) -> io::Result<()>) -> io::Result<()> {
     let mut builder = tempfile::Builder::new();
     // As any new file, not for its owner alone; the process's umask still holds.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
     let mut file = builder.prefix(".").suffix(".part").tempfile_in(folder)?;
-    file.write_all(bytes)?;
+    contents(file.as_file_mut())?;
     file.as_file().sync_all()?;
     file.persist(path)?;
     Ok(())

@@ -41,11 +41,9 @@ impl Refresh {
 /// The weights of all transitions.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Weights {
-    /// `w_traj` (Eq. 6).
+    /// `w_traj` of each trajectory (Eq. 6).
     pub trajectory: Vec<f32>,
-    /// `w_cf` (Eq. 9), smoothed over refreshes.
-    pub counterfactual: Vec<f32>,
-    /// `w` (Eq. 10); all 1 before the first refresh.
+    /// `w` of each transition (Eq. 10); all 1 before the first refresh.
     pub combined: Vec<f32>,
     /// Share of the transitions with a margin above 0 (Eq. 8) at the last refresh.
     pub active: f64,
@@ -55,24 +53,32 @@ impl Weights {
     /// Weights before the first refresh; `beta` is that of Eq. 6.
     pub fn ones(data: &Dataset, limit: f32, beta: f64) -> Self {
         let trajectory = trajectory::weights(data, limit, beta);
-        let ones = vec![1.0; data.len()];
-        Self { trajectory, counterfactual: ones.clone(), combined: ones, active: 0.0 }
+        Self { trajectory, combined: vec![1.0; data.len()], active: 0.0 }
     }
 
-    /// Eq. 10 over the whole data: `w = clip(w_traj w_cf / (E[w_traj w_cf] + eps), w_min, w_max)`.
-    pub fn combine(&mut self, [low, high]: [f64; 2]) {
-        let product = || self.trajectory.iter().zip(&self.counterfactual).map(|(&a, &b)| f64::from(a) * f64::from(b));
-        let mean = product().sum::<f64>() / self.trajectory.len() as f64;
-        self.combined = product().map(|weight| (weight / (mean + EPSILON)).clamp(low, high) as f32).collect();
+    /// Eq. 10 over the whole data: `w = clip(w_traj w_cf / (E[w_traj w_cf] + eps), w_min, w_max)`,
+    /// with `counterfactual`, `w_cf` of each transition.
+    pub fn combine(&mut self, data: &Dataset, counterfactual: &[f32], [low, high]: [f64; 2]) {
+        let Self { trajectory, combined, .. } = self;
+        let product = |row| f64::from(trajectory[data.trajectory(row)]) * f64::from(counterfactual[row]);
+        let mean = (0..data.len()).map(product).sum::<f64>() / data.len() as f64;
+        for (row, weight) in combined.iter_mut().enumerate() {
+            *weight = (product(row) / (mean + EPSILON)).clamp(low, high) as f32;
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::testing::recording;
 
-    fn weights(trajectory: Vec<f32>, counterfactual: Vec<f32>) -> Weights {
-        Weights { combined: vec![1.0; trajectory.len()], trajectory, counterfactual, active: 0.0 }
+    /// Eq. 10 for trajectories of one transition each.
+    fn combined(trajectory: &[f32], counterfactual: &[f32], clip: [f64; 2]) -> Vec<f32> {
+        let data = recording(trajectory.len(), 1, |_| 0.0, |_| 0.0);
+        let mut weights = Weights { trajectory: trajectory.to_vec(), ..Weights::ones(&data, 1.0, 0.0) };
+        weights.combine(&data, counterfactual, clip);
+        weights.combined
     }
 
     #[test]
@@ -94,18 +100,16 @@ mod tests {
 
     #[test]
     fn weights_have_mean_one_before_the_clip() {
-        let mut weights = weights(vec![1.5, 1.0, 1.0, 1.0], vec![1.0, 1.2, 1.0, 2.0]);
-        weights.combine([0.0, 10.0]);
-        let mean = weights.combined.iter().sum::<f32>() / 4.0;
+        let weights = combined(&[1.5, 1.0, 1.0, 1.0], &[1.0, 1.2, 1.0, 2.0], [0.0, 10.0]);
+        let mean = weights.iter().sum::<f32>() / 4.0;
         assert!((mean - 1.0).abs() < 1e-5);
-        let ratio = weights.combined[3] / weights.combined[2];
+        let ratio = weights[3] / weights[2];
         assert!((ratio - 2.0).abs() < 1e-6);
     }
 
     #[test]
     fn weights_are_clipped() {
-        let mut weights = weights(vec![1.0; 5], vec![1.0, 1.0, 1.0, 1.0, 20.0]);
-        weights.combine([0.8, 2.0]);
-        assert_eq!(weights.combined, [0.8, 0.8, 0.8, 0.8, 2.0]);
+        let weights = combined(&[1.0; 5], &[1.0, 1.0, 1.0, 1.0, 20.0], [0.8, 2.0]);
+        assert_eq!(weights, [0.8, 0.8, 0.8, 0.8, 2.0]);
     }
 }

@@ -65,10 +65,9 @@ impl Reweighting {
 
     /// The weights that followed from counterfactual weights of an earlier refresh,
     /// which raised the share `active`.
-    pub fn restore(&mut self, counterfactual: &[f32], active: f64) {
-        self.weights.counterfactual.copy_from_slice(counterfactual);
+    pub fn restore(&mut self, data: &Dataset, counterfactual: &[f32], active: f64) {
         self.weights.active = active;
-        self.weights.combine(self.clip);
+        self.weights.combine(data, counterfactual, self.clip);
     }
 
     /// Whether a refresh is due before training step `step`, counted from 0.
@@ -107,7 +106,7 @@ impl Reweighting {
             active = margins.iter().filter(|margin| **margin > 0.0).count();
         }
         let active = active as f64 / rows as f64;
-        self.restore(counterfactual, active);
+        self.restore(source.data(), counterfactual, active);
         active
     }
 

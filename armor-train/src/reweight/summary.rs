@@ -29,12 +29,7 @@ mod tests {
 
     #[test]
     fn activity_is_that_of_the_last_refresh_and_quantiles_are_of_the_combined() {
-        let weights = Weights {
-            trajectory: vec![1.0; 5],
-            counterfactual: vec![1.0, 1.0, 1.0, 1.5, 1.0],
-            combined: vec![5.0, 1.0, 2.0, 3.0, 4.0],
-            active: 0.4,
-        };
+        let weights = Weights { trajectory: vec![1.0; 5], combined: vec![5.0, 1.0, 2.0, 3.0, 4.0], active: 0.4 };
         let summary = WeightSummary::new(&weights);
         assert_eq!(summary.active, 0.4);
         let expected = [1.0, 1.4, 3.0, 4.6, 4.8, 4.96, 5.0];

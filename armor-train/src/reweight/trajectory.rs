@@ -2,10 +2,10 @@
 
 use crate::data::Dataset;
 
-/// `w_traj = 1 + beta [C_i <= d]` of each transition's trajectory (Eq. 6), with
+/// `w_traj = 1 + beta [C_i <= d]` of each trajectory (Eq. 6), with
 /// the limit in units of recorded cost.
 pub fn weights(data: &Dataset, limit: f32, beta: f64) -> Vec<f32> {
-    (0..data.len()).map(|row| weight(data.trajectory_cost(row), limit, beta)).collect()
+    data.trajectories().iter().map(|trajectory| weight(trajectory.cost_return, limit, beta)).collect()
 }
 
 /// The `beta` that gives feasible trajectories, a share `p` of the data, the mass `mass` (Eq. 7).

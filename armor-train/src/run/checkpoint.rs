@@ -1,8 +1,12 @@
 //! The file that a run goes on from.
 
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
 use firmware_sim::file;
+use postcard::ser_flavors::crc::CrcModifier;
+use postcard::ser_flavors::io::WriteFlavor;
 use serde::{Deserialize, Serialize};
 
 use super::RunError;
@@ -57,10 +61,34 @@ impl<S: Serialize> Checkpoint<S> {
     /// [`RunError::File`]; the checkpoint before is kept then.
     pub fn write(&self, folder: &Path) -> Result<(), RunError> {
         let path = folder.join(Checkpoint::FILE);
-        let body = postcard::to_stdvec_crc32(self, CRC.digest());
-        let mut bytes = body.map_err(|_| RunError::Checkpoint { path: path.clone() })?;
-        bytes.splice(..0, *MAGIC);
-        Ok(file::write(&path, &bytes)?)
+        Ok(file::write_with(&path, |file| {
+            file.write_all(MAGIC)?;
+            let mut failure = Ok(());
+            let writer = BufWriter::new(Attentive { file, failure: &mut failure });
+            let flavor = CrcModifier::new(WriteFlavor::new(writer), CRC.digest());
+            let written = postcard::serialize_with_flavor(self, flavor).map(drop);
+            failure.and(written.map_err(io::Error::other))
+        })?)
+    }
+}
+
+/// Keeps the error that the serialiser would forget.
+struct Attentive<'a> {
+    file: &'a mut File,
+    failure: &'a mut io::Result<()>,
+}
+
+impl Write for Attentive<'_> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.file.write(bytes).map_err(|error| {
+            let kind = error.kind();
+            *self.failure = Err(error);
+            kind.into()
+        })
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
     }
 }
 

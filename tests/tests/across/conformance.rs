@@ -44,11 +44,11 @@ fn weights_are_one_before_the_warm_up_and_keep_their_bounds_after_it() {
     for step in 0..warmup + 3 * interval {
         let before = (step > warmup).then(|| learner.weights().clone());
         learner.step();
-        let weights = learner.weights();
+        let (weights, counterfactual) = (learner.weights(), &learner.state().counterfactual);
         if step < warmup {
             // Every weight, but not at every step: there are 94,000.
             if step.is_multiple_of(50) || step + 1 == warmup {
-                assert!(weights.combined.iter().chain(&weights.counterfactual).all(|&weight| weight == 1.0));
+                assert!(weights.combined.iter().chain(counterfactual).all(|&weight| weight == 1.0));
             }
             continue;
         }
@@ -60,18 +60,19 @@ fn weights_are_one_before_the_warm_up_and_keep_their_bounds_after_it() {
 
         // Eq. 9 caps the new value at 2, and each refresh goes 0.3 of the way there.
         let most = 2.0 - 0.7f32.powi(refreshes) + 1e-6;
-        assert!(weights.counterfactual.iter().all(|weight| (1.0..=most).contains(weight)));
-        let raised = weights.counterfactual.iter().filter(|&&weight| weight > 1.0).count();
+        assert!(counterfactual.iter().all(|weight| (1.0..=most).contains(weight)));
+        let raised = counterfactual.iter().filter(|&&weight| weight > 1.0).count();
         assert!(raised > 0 && raised < data.len(), "{raised} of {}", data.len());
 
         // Eq. 6.
-        let feasible = |row: usize| data.trajectory_cost(row) <= LIMIT;
-        let expected = (0..data.len()).map(|row| if feasible(row) { 1.5 } else { 1.0 });
+        let costs = data.trajectories().iter().map(|trajectory| trajectory.cost_return);
+        let expected = costs.map(|cost| if cost <= LIMIT { 1.5 } else { 1.0 });
         assert!(weights.trajectory.iter().copied().eq(expected));
 
         // Eq. 10: mean 1, then the clip.
-        let products = weights.trajectory.iter().zip(&weights.counterfactual);
-        let products: Vec<f64> = products.map(|(&a, &b)| f64::from(a) * f64::from(b)).collect();
+        let of_trajectory = |row| f64::from(weights.trajectory[data.trajectory(row)]);
+        let products = counterfactual.iter().enumerate().map(|(row, &weight)| of_trajectory(row) * f64::from(weight));
+        let products: Vec<f64> = products.collect();
         let mean = products.iter().sum::<f64>() / data.len() as f64;
         let unclipped: Vec<f64> = products.iter().map(|product| product / (mean + EPSILON)).collect();
         assert!((unclipped.iter().sum::<f64>() / data.len() as f64 - 1.0).abs() < 2e-6);
