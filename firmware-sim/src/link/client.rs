@@ -135,6 +135,7 @@ impl<L: Read + Write> Client<L> {
                 let length = match self.line.read(&mut chunk) {
                     Ok(0) => return Err(ClientError::Left),
                     Ok(length) => length,
+                    Err(error) if error.kind() == ErrorKind::Interrupted => continue,
                     Err(error) if matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::WouldBlock) => break,
                     Err(error) => return Err(error.into()),
                 };

@@ -17,6 +17,8 @@ use crate::memory::AlignedBytes;
 const LONG: Duration = Duration::from_secs(60);
 /// What a test does wait out.
 const SHORT: Duration = Duration::from_millis(30);
+/// What a test waits out where the other end must answer within four of them.
+const ENOUGH: Duration = Duration::from_millis(120);
 
 /// Runs a check with the two ends of a connection.
 fn connected() -> (TcpStream, TcpStream) {
@@ -156,7 +158,7 @@ fn lost_doubled_broken_and_cut_frames_change_no_action_and_no_budget() {
     for nth in [3, 5, 7] {
         let (plant, served) = connected();
         let server = serving(patient_socket(served, LONG).unwrap(), LONG);
-        let mut client = Client::new(Faulty { line: patient_socket(plant, SHORT).unwrap(), nth, frames: 0 });
+        let mut client = Client::new(Faulty { line: patient_socket(plant, ENOUGH).unwrap(), nth, frames: 0 });
         assert_eq!(flown_over(&mut client, 60, 9), expected, "every {nth}th frame");
         drop(client);
         assert!(server.join().unwrap().unwrap() >= 60);
