@@ -7,6 +7,7 @@ use armor_train::actor::chain::Chain;
 use armor_train::actor::denoiser::{Denoiser, Widths};
 use armor_train::actor::{Actor, CloningNorm, Guidance, PolicyGradient, Process};
 use armor_train::critic::{Critic, Task};
+use armor_train::data::{Dataset, Recording};
 use armor_train::dual::{Dual, DualOptions};
 use armor_train::model::{ActorCopy, CriticCopy, Model, Optimisers, Parameters};
 use armor_train::nn::Adam;
@@ -250,6 +251,23 @@ fn critic_values_are_pytorchs() {
     }
 }
 
+/// A trajectory for each sample.
+fn single_steps() -> Dataset {
+    let recording = Recording {
+        state_dim: STATE,
+        action_dim: ACTION,
+        observations: vec![0.0; SAMPLES * STATE],
+        next_observations: vec![0.0; SAMPLES * STATE],
+        actions: vec![0.0; SAMPLES * ACTION],
+        rewards: vec![0.0; SAMPLES],
+        costs: vec![0.0; SAMPLES],
+        terminals: vec![false; SAMPLES],
+        timeouts: vec![true; SAMPLES],
+        sha256: [0; 32],
+    };
+    Dataset::new(recording).expect("the recording is sound")
+}
+
 #[test]
 fn counterfactual_weights_are_pytorchs() {
     let reference = Reference::read();
@@ -274,16 +292,13 @@ fn counterfactual_weights_are_pytorchs() {
             assert!((f64::from(*actual) - expected).abs() < 1e-6, "{key}: {actual} is not {expected}");
         }
     };
-    let mut weights = Weights {
-        trajectory: to_f32(reference.numbers("w_traj")),
-        counterfactual: vec![1.0; SAMPLES],
-        combined: vec![1.0; SAMPLES],
-        active: 0.0,
-    };
+    let mut counterfactual = vec![1.0; SAMPLES];
     let rows: Vec<usize> = (0..SAMPLES).collect();
-    settings.update(&to_f32(margin), &rows, &mut weights.counterfactual);
-    close("w_cf", &weights.counterfactual);
-    weights.combine([0.8, 2.0]);
+    settings.update(&to_f32(margin), &rows, &mut counterfactual);
+    close("w_cf", &counterfactual);
+    let mut weights =
+        Weights { trajectory: to_f32(reference.numbers("w_traj")), combined: vec![1.0; SAMPLES], active: 0.0 };
+    weights.combine(&single_steps(), &counterfactual, [0.8, 2.0]);
     close("weights", &weights.combined);
 }
 
