@@ -32,7 +32,7 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
     write_with(path, |file| file.write_all(bytes))
 }
 
-/// As [`write`], for contents that are not held in memory: `contents` writes them part by part.
+/// As [`write()`], for contents that are not held in memory: `contents` writes them part by part.
 ///
 /// # Errors
 /// [`FileError`]; `path` is as it was then.
