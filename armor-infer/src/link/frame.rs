@@ -44,8 +44,12 @@ impl fmt::Display for FrameError {
 impl core::error::Error for FrameError {}
 
 /// The longest frame of a message of at most `message` bytes, its end included.
+///
+/// A code byte goes before each run of 254 bytes and before what follows, even
+/// where nothing does: one more than COBS needs, as postcard writes it.
 pub const fn frame_bytes(message: usize) -> usize {
-    cobs::max_encoding_length(message + CHECKSUM_BYTES) + 1
+    let content = message + CHECKSUM_BYTES;
+    content + content / 254 + 1 + 1
 }
 
 /// Writes a message as a frame to the front of `buffer`; returns the frame.

@@ -315,6 +315,15 @@ proptest! {
         prop_assert_eq!(found, Some(content));
     }
 
+    /// A content without a zero of about 254 bytes, its checksum among them.
+    #[test]
+    fn a_run_that_ends_the_content_fits_its_frame(byte in 1u8.., length in 240usize..260) {
+        let mut buffer = [0; 1024];
+        let content = [byte; 260];
+        let frame = encode(&&content[..length], &mut buffer).unwrap();
+        prop_assert!(frame.len() <= frame_bytes(length + 2));
+    }
+
     #[test]
     fn no_noise_on_the_line_changes_the_budget(noise in proptest::collection::vec(any::<u8>(), 0..2000)) {
         greeted(|mut endpoint, _| {
