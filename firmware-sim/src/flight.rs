@@ -170,7 +170,7 @@ pub(crate) fn controller<'a>(image: &PolicyImage<'a>, plan: &FlightPlan) -> Resu
     HostController::new(policy, plan.limit, 0).map_err(FlightError::Load)
 }
 
-/// Whether image, task and rate go together; how many plant steps hold an action.
+/// Whether image, task, rate and limit go together; how many plant steps hold an action.
 pub(crate) fn check(image: &PolicyImage<'_>, plan: &FlightPlan) -> Result<usize, FlightError> {
     let (task, manifest) = (plan.task, image.manifest());
     if !task.flies(manifest.task) {
@@ -184,6 +184,7 @@ pub(crate) fn check(image: &PolicyImage<'_>, plan: &FlightPlan) -> Result<usize,
     if plan.rate_hz == 0 || !task.rate_hz.is_multiple_of(plan.rate_hz) {
         return Err(FlightError::Rate { task: task.name, task_rate: task.rate_hz, rate: plan.rate_hz });
     }
+    Policy::load(image).and_then(|policy| HostController::new(policy, plan.limit, 0)).map_err(FlightError::Load)?;
     Ok((task.rate_hz / plan.rate_hz) as usize)
 }
 

@@ -248,19 +248,6 @@ impl Chip {
         Some(image.manifest().task.into())
     }
 
-    /// The slot that boots; none on a new chip.
-    ///
-    /// # Errors
-    /// [`FlashFault`]
-    pub fn active(&mut self) -> Result<Option<Slot>, FlashFault> {
-        Ok(boot_log::latest(&mut self.flash)?.map(Entry::active))
-    }
-
-    /// The flash, to cut its power, flip its bits or keep a journal in it.
-    pub const fn flash_mut(&mut self) -> &mut NorModel {
-        &mut self.flash
-    }
-
     fn slot(&self, slot: Slot) -> &[u8] {
         &self.flash.bytes()[slot.start()..][..SLOT_BYTES]
     }

@@ -117,13 +117,13 @@ fn an_update_survives_a_power_cut_at_every_operation() {
     let mut flown = [0; 2];
     for cut in 0..operations {
         let mut chip = before.clone();
-        chip.flash_mut().cut_power_after(cut, cut);
+        chip.flash.cut_power_after(cut, cut);
         update(&mut chip).unwrap_err();
         // Power fails again at the first operation of the boot, if it has one.
-        chip.flash_mut().restore_power();
-        chip.flash_mut().cut_power_after(0, !cut);
+        chip.flash.restore_power();
+        chip.flash.cut_power_after(0, !cut);
         let _ = chip.boot();
-        chip.flash_mut().restore_power();
+        chip.flash.restore_power();
         let (_, image) = booted(&mut chip);
         assert!(image == old || image == new, "cut {cut}");
         flown[usize::from(image == new)] += 1;

@@ -10,7 +10,7 @@ use serde::Serialize;
 use super::output::{CommandResult, Output};
 use crate::chip::{Chip, Slot};
 use crate::file;
-use crate::flight::{FlightPlan, fly};
+use crate::flight::{FlightPlan, check, fly};
 use crate::latency::Latency;
 use crate::summary::FlightSummary;
 use crate::task::Task;
@@ -74,6 +74,7 @@ struct Report {
 impl Run {
     pub(super) fn run(self, output: Output) -> CommandResult {
         let task = self.task;
+        task.plant()?;
         let limit = self.limit.map_or_else(|| CostLimit::new(task.cost_limit), Ok)?;
         let rate_hz = self.rate.unwrap_or(task.rate_hz);
         let plan =
@@ -81,6 +82,10 @@ impl Run {
 
         let mut chip = Chip::read(&self.chip)?;
         let boot = chip.boot();
+        if let Ok(boot) = &boot {
+            // A flight that cannot start must not end the trial of a good policy.
+            check(&PolicyImage::new_checked(boot.image.as_slice())?, &plan)?;
+        }
         chip.write(&self.chip)?;
         let boot = boot?;
         if let Some(fault) = boot.passed_over {

@@ -57,6 +57,8 @@ fn a_flight_that_does_not_fit_is_refused() {
     let with = |options: &[&str]| bench.failure(&[&RUN[..], options].concat());
     assert!(with(&["--rate", "7"]).contains("30 Hz or a whole fraction, not at 7"));
     assert!(with(&["--limit", &(TRAINED_MAX + 1.0).to_string()]).contains("set a limit of at most 40"));
+    // None of these was a flight, so the policy is still on trial.
+    assert!(text(&bench.run(&RUN).stderr).contains("slot A flew its trial and is confirmed"));
     let simulator = ["run", "--chip", "robot.chip", "--task", "SafetyPointGoal1-v0"];
     assert!(bench.failure(&simulator).contains("needs its simulator: fly it by armor-train evaluate"));
 
