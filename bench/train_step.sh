@@ -12,7 +12,7 @@ target="${CARGO_TARGET_DIR:-target}"
 python="${ARMOR_TORCH_PYTHON:-$target/bench-venv/bin/python}"
 if [ -z "${ARMOR_TORCH_PYTHON:-}" ] && ! "$python" -c 'import torch' 2>/dev/null; then
     python3 -m venv "$target/bench-venv"
-    "$python" -m pip install --quiet torch
+    "$python" -m pip install --quiet torch==2.2.2 "numpy<2"
 fi
 cargo build --release --quiet -p armor-train --example bench_step
 exec "$python" bench/train_step.py "$target/release/examples/bench_step" "$@"

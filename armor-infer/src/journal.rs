@@ -5,7 +5,8 @@
 //! is taken unless kappa less the worst cost of a step is at least the floor
 //! on flash. After a reset the floor is what is left: the interrupted action
 //! is charged as the worst, and nothing is ever given back. Where no record is
-//! valid, nothing is left.
+//! valid, nothing is left. That holds for power cuts; where a bit of the last
+//! record decays, the one before it counts, whose floor is a reserve higher.
 //!
 //! Floors fall in steps of a *reserve*: the larger it is, the fewer records are
 //! written and the more an interrupted episode forfeits. A record is written

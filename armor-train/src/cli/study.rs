@@ -34,8 +34,8 @@ const TABLE_FILE: &str = "table.md";
 /// was; runs that are done are not repeated.
 #[derive(Debug, clap::Args)]
 pub(super) struct Study {
-    /// A study that ships with the project, or a TOML file; the help of a
-    /// wrong name lists them, and their own text is the best example.
+    /// A TOML file, or a study that ships with the project: ablation,
+    /// options-ball-run, options-point-circle.
     name: String,
     /// An HDF5 file in the DSRL layout.
     #[arg(long, value_name = "H5")]

@@ -1,4 +1,4 @@
-//! Simulated NOR flash, as the microcontrollers of [`armor_infer`] have it.
+//! Simulated NOR flash, as the microcontrollers that fly a policy have it.
 //!
 //! Reads of bytes, writes of whole words that only clear bits, erases of whole
 //! blocks, wear counted; and power that may be cut within any operation.
