@@ -45,6 +45,18 @@ impl Cost {
         Self(self.0.saturating_sub(other.0))
     }
 
+    /// Both together; [`Cost::MAX`] where that is too much to write down.
+    #[must_use]
+    pub const fn saturating_add(self, other: Self) -> Self {
+        Self(self.0.saturating_add(other.0))
+    }
+
+    /// This cost `count` times; [`Cost::MAX`] where that is too much to write down.
+    #[must_use]
+    pub const fn saturating_mul(self, count: u32) -> Self {
+        Self(self.0.saturating_mul(count))
+    }
+
     /// The raw count of `2^-16` steps, as it stands in images and on the wire.
     pub const fn to_raw(self) -> u32 {
         self.0

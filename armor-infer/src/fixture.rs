@@ -40,6 +40,7 @@ impl Fixture {
     pub(crate) fn random(shape: Shape, seed: u64) -> Parts {
         let manifest = Manifest {
             task: "fixture",
+            release: 0,
             shape,
             precision: Precision::F32,
             kappa: KappaRange { scale: 0.05, trained_max: Cost::from_incurred(TRAINED_MAX).unwrap() },

@@ -13,6 +13,7 @@
 //! | Appendix B, the denoiser | `denoiser/` |
 //! | its products and activations, bit for bit on every machine | `kernel/` |
 //! | - (the wire to a robot or its simulator, `docs/link.md`) | `link/` |
+//! | - (what a cost monitor reports, charged once) | `meter.rs` |
 //! | - (the budget across resets, in flash) | `journal.rs`, `log.rs` |
 //!
 //! Words: a *policy* is a trained network and its chains, in flash; *kappa* is
@@ -62,6 +63,7 @@ pub mod journal;
 mod kernel;
 pub mod link;
 pub mod log;
+pub mod meter;
 mod policy;
 mod sampler;
 

@@ -78,6 +78,7 @@ impl Parts {
         };
         let manifest = Manifest {
             task,
+            release: 0,
             shape,
             precision: Precision::F32,
             kappa: KappaRange { scale: 0.05, trained_max: Cost::from_raw((TRAINED_MAX as u32) << 16) },

@@ -6,6 +6,7 @@
 //! | [`task`], [`plant`] | the tasks and their scores; robots in f64, equal to their simulators |
 //! | [`calibrate`] | how far a plant is from a recording |
 //! | [`image_file`], [`flash`], [`chip`] | an image in a file; flash whose power can be cut; two slots of it that boot one |
+//! | [`board`] | microcontroller boards, and a model of what an action takes on them |
 //! | [`host`], [`flight`], [`summary`] | the controller on this computer, in a fixed-rate loop, and its scores |
 //! | [`link`] | the controller behind a wire, for a robot or its simulator |
 //! | [`simulator`] | the simulators that fly the tasks of the paper, over the link |
@@ -24,6 +25,7 @@
 
 #![forbid(unsafe_code)]
 
+pub mod board;
 pub mod calibrate;
 pub mod chip;
 pub mod cli;

@@ -42,6 +42,7 @@ impl Parts {
             Quality { rung: 1, limit: Cost::from_raw(99), episodes: 20, reward_normalized: 0.25, cost_normalized: 0.5 };
         let manifest = Manifest {
             task: "ball-run",
+            release: 7,
             shape,
             precision: Precision::F32,
             kappa: KappaRange { scale: 0.05, trained_max: Cost::from_raw(80 << 16) },

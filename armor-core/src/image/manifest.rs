@@ -19,6 +19,8 @@ pub const SECTION_COUNT: usize = SectionKind::ALL.len();
 pub struct Manifest<'a> {
     /// The task that the policy was trained for, such as `ball-run`.
     pub task: &'a str,
+    /// Number of this release of the task's policy: a chip takes none below that of its confirmed policy.
+    pub release: u32,
     /// Dimensions of the network.
     pub shape: Shape,
     /// Number format of weights and activations.

@@ -9,7 +9,7 @@ use firmware_sim::file;
 use serde::Serialize;
 
 use super::run_folder::export_folder;
-use crate::export::Agreement;
+use crate::export::{Agreement, released};
 use crate::quantize::{COST_BOUND, Drift, REWARD_BOUND, quantize};
 
 /// Write the policy of a run as an image for the controller.
@@ -26,6 +26,9 @@ pub(super) struct Export {
     /// The image to write.
     #[arg(short, long, value_name = "IMAGE")]
     output: PathBuf,
+    /// Release number: a robot's chip refuses one below that of its confirmed policy.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    release: u32,
     /// The run's recorded data, if it was moved.
     #[arg(long)]
     data: Option<PathBuf>,
@@ -55,6 +58,7 @@ impl From<Precision> for image::Precision {
 #[derive(Serialize)]
 struct Report {
     image: PathBuf,
+    release: u32,
     precision: Precision,
     image_bytes: usize,
     steps: u64,
@@ -74,8 +78,10 @@ impl Export {
                 (quantized.bytes, quantized.agreement, quantized.drift)
             }
         };
+        let bytes = released(&PolicyImage::new_checked(bytes.as_slice())?, self.release)?;
         let report = Report {
             image: self.output,
+            release: self.release,
             precision: self.precision,
             image_bytes: bytes.as_slice().len(),
             steps: checkpoint.state.step,

@@ -1,7 +1,8 @@
 //! Makes the image, measures it, and makes it again with what was measured.
 
 use armor_core::image::{
-    KappaRange, MAX_RUNGS, Manifest, PolicyImage, Precision, Provenance, Quality, Rung, SECTION_COUNT, write,
+    KappaRange, MAX_RUNGS, Manifest, PolicyImage, Precision, Provenance, Quality, Rung, SECTION_COUNT, SectionKind,
+    write,
 };
 use armor_core::schedule::Sampler;
 use armor_core::shape::Shape;
@@ -125,6 +126,7 @@ fn manifest<'a>(checkpoint: &'a Checkpoint, actor: &Actor, data: &Dataset) -> Ma
     };
     Manifest {
         task: &config.task,
+        release: 0,
         shape,
         precision: Precision::F32,
         kappa: KappaRange {
@@ -149,6 +151,15 @@ fn manifest<'a>(checkpoint: &'a Checkpoint, actor: &Actor, data: &Dataset) -> Ma
         quality: Default::default(),
         sections: Default::default(),
     }
+}
+
+/// The same image as release `release` of its task's policy.
+///
+/// # Errors
+/// [`ExportError::Write`]
+pub fn released(image: &PolicyImage<'_>, release: u32) -> Result<ImageBytes, ExportError> {
+    let sections = SectionKind::ALL.map(|kind| image.words(kind).to_vec());
+    build(&Manifest { release, ..image.manifest().clone() }, &sections)
 }
 
 /// Writes an image into memory of its size.

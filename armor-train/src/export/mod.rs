@@ -14,7 +14,7 @@ use armor_infer::LoadError;
 use firmware_sim::memory::AlignedBytes;
 
 pub use agreement::{AGREEMENT_BOUND, AGREEMENT_SAMPLES, Agreement, agreement};
-pub use build::{Exported, export};
+pub use build::{Exported, export, released};
 pub(crate) use build::{build, quality};
 pub(crate) use golden::record as record_golden;
 

@@ -9,8 +9,9 @@
 //! An update goes to the slot that holds no confirmed policy, is read back, and
 //! then tried: the log says so in a single record, so that power may be cut at
 //! any write or erase and the old policy boots, or the new one, whole. Nothing
-//! that does not check, whose golden trace does not replay, or that is for
-//! another task is ever written; and where the active slot has gone bad, the
+//! is ever written that does not check, whose golden trace does not replay,
+//! that is for another task or robot, is an older release than the confirmed
+//! policy or takes smaller budgets; and where the active slot has gone bad, the
 //! other one boots, if that is good, and the log keeps the reason.
 
 mod boot;
@@ -20,7 +21,8 @@ mod header;
 use std::ops::Range;
 use std::path::Path;
 
-use armor_core::image::PolicyImage;
+use armor_core::image::{Manifest, PolicyImage};
+use armor_core::units::Cost;
 use embedded_storage::nor_flash::{NorFlash, ReadNorFlash};
 use serde::Serialize;
 use thiserror::Error;
@@ -112,6 +114,37 @@ pub enum FlashError {
         /// Task of the image.
         image: String,
     },
+    /// The robot has other sensors or actuators.
+    #[error(
+        "the chip's policy senses {} and moves {} entries, the image {} and {}; flash it to a chip of its own",
+        flown[0], flown[1], image[0], image[1]
+    )]
+    WrongRobot {
+        /// State and action entries of the policy that boots.
+        flown: [u16; 2],
+        /// Those of the image.
+        image: [u16; 2],
+    },
+    /// The image was trained with smaller budgets: the robot's limit might be refused in the field.
+    #[error(
+        "the confirmed policy takes cost limits up to {confirmed} and the image up to {image}; train it with larger budgets"
+    )]
+    KappaRange {
+        /// The largest limit of the confirmed policy.
+        confirmed: Cost,
+        /// That of the image.
+        image: Cost,
+    },
+    /// The image is older than the confirmed policy.
+    #[error(
+        "the confirmed policy is release {confirmed} and the image release {image}; export it as release {confirmed} or later"
+    )]
+    Downgrade {
+        /// Release of the confirmed policy.
+        confirmed: u32,
+        /// Release of the image.
+        image: u32,
+    },
     /// The slot named holds the policy to go back to.
     #[error("slot {slot} holds the confirmed policy, which stays until another is confirmed; leave out the slot")]
     Confirmed {
@@ -173,6 +206,21 @@ impl Chip {
         Self { flash: NorModel::erased(BLOCKS) }
     }
 
+    /// A chip with this flash; nothing where it is of another size.
+    pub fn with_flash(flash: NorModel) -> Option<Self> {
+        (flash.bytes().len() == FLASH_BYTES).then_some(Self { flash })
+    }
+
+    /// Its flash, for a firmware that writes the journal.
+    pub fn into_flash(self) -> NorModel {
+        self.flash
+    }
+
+    /// The bits of a slot's image in flash, for faults; the slot's whole range.
+    pub const fn slot_bits(slot: Slot) -> Range<usize> {
+        8 * slot.start()..8 * (slot.start() + SLOT_BYTES)
+    }
+
     /// Reads a chip file.
     ///
     /// # Errors
@@ -211,11 +259,7 @@ impl Chip {
             return Err(FlashError::TooLarge { bytes: image.len() });
         }
         let entry = boot_log::latest(&mut self.flash)?;
-        if let Some(flown) = self.task(entry)
-            && flown != checked.image.manifest().task
-        {
-            return Err(FlashError::WrongTask { flown, image: checked.image.manifest().task.into() });
-        }
+        self.check_update(entry, checked.image.manifest())?;
         let spare = entry.map_or(Slot::A, Entry::spare);
         let slot = slot.unwrap_or(spare);
         if entry.is_some() && slot != spare {
@@ -242,10 +286,33 @@ impl Chip {
         if written == words { Ok(()) } else { Err(FlashError::ReadBack { slot }) }
     }
 
-    /// The task of the policy that boots, where one does.
-    fn task(&self, entry: Option<Entry>) -> Option<String> {
-        let image = PolicyImage::new_checked(self.slot(entry?.active())).ok()?;
-        Some(image.manifest().task.into())
+    /// Whether an image may follow the policy that boots, and the confirmed one that it may replace.
+    fn check_update(&self, entry: Option<Entry>, image: &Manifest<'_>) -> Result<(), FlashError> {
+        let Some(entry) = entry else { return Ok(()) };
+        if let Some(flown) = self.manifest(entry.active()) {
+            if flown.task != image.task {
+                return Err(FlashError::WrongTask { flown: flown.task.into(), image: image.task.into() });
+            }
+            let [flown, image] = [&flown, image].map(|manifest| [manifest.shape.state, manifest.shape.action]);
+            if flown != image {
+                return Err(FlashError::WrongRobot { flown, image });
+            }
+        }
+        if let Some(confirmed) = self.manifest(entry.spare().other()) {
+            let [confirmed_max, image_max] = [&confirmed, image].map(|manifest| manifest.kappa.trained_max);
+            if image_max < confirmed_max {
+                return Err(FlashError::KappaRange { confirmed: confirmed_max, image: image_max });
+            }
+            if image.release < confirmed.release {
+                return Err(FlashError::Downgrade { confirmed: confirmed.release, image: image.release });
+            }
+        }
+        Ok(())
+    }
+
+    /// What the image in a slot says of itself, where there is one.
+    fn manifest(&self, slot: Slot) -> Option<Manifest<'_>> {
+        PolicyImage::new_checked(self.slot(slot)).ok().map(|image| image.manifest().clone())
     }
 
     fn slot(&self, slot: Slot) -> &[u8] {

@@ -96,6 +96,46 @@ fn an_image_for_another_task_is_refused() {
     assert!(refused.contains("the chip flies ball-run and the image is for ball-circle"), "{refused}");
 }
 
+/// A `ball-run` image of a release, trained with budgets of up to `trained_max`.
+fn release(release: u32, trained_max: u32) -> AlignedBytes {
+    let mut parts = Parts::random("ball-run", BALL_RUN, release.into());
+    parts.manifest.release = release;
+    parts.manifest.kappa.trained_max = Cost::from_raw(trained_max << 16);
+    AlignedBytes::from(parts.with_golden().bytes().as_slice())
+}
+
+#[test]
+fn a_downgrade_is_refused_against_the_confirmed_policy_alone() {
+    let mut chip = Chip::blank();
+    chip.flash(release(5, 40).as_slice(), None).unwrap();
+    // A first policy that nobody confirmed is nothing to go back to.
+    chip.flash(release(3, 40).as_slice(), None).unwrap();
+    chip.boot().unwrap();
+    chip.confirm().unwrap();
+    chip.flash(release(9, 40).as_slice(), None).unwrap();
+    let before = chip.clone();
+    let refused = chip.flash(release(2, 40).as_slice(), None);
+    assert_eq!(refused, Err(FlashError::Downgrade { confirmed: 3, image: 2 }));
+    assert_eq!(chip, before);
+    // Release 9 is on trial only, and the confirmed one may be flashed again.
+    chip.flash(release(3, 40).as_slice(), None).unwrap();
+    assert_eq!(booted(&mut chip).1, release(3, 40));
+}
+
+#[test]
+fn an_image_for_smaller_budgets_or_another_robot_is_refused() {
+    let mut chip = flashed(&[1]);
+    let [confirmed, image] = [40, 39].map(|units| Cost::from_raw(units << 16));
+    let refused = chip.flash(release(1, 39).as_slice(), None);
+    assert_eq!(refused, Err(FlashError::KappaRange { confirmed, image }));
+    chip.flash(release(1, 41).as_slice(), None).unwrap();
+
+    let shape = Shape { state: 8, ..BALL_RUN };
+    let other = AlignedBytes::from(Parts::random("ball-run", shape, 2).with_golden().bytes().as_slice());
+    let refused = chip.flash(other.as_slice(), None);
+    assert_eq!(refused, Err(FlashError::WrongRobot { flown: [7, 2], image: [8, 2] }));
+}
+
 /// Power is cut at every write and erase of an update over an older image, and
 /// of the boots after it. Whatever is cut, the next boot flies the old policy
 /// or the new one, bit for bit; and a second try of the update gets through.

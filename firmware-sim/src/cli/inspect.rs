@@ -21,6 +21,7 @@ pub(super) struct Inspect {
 #[derive(Serialize)]
 struct Report {
     task: String,
+    release: u32,
     format_version: u16,
     image_bytes: usize,
     precision: Precision,
@@ -78,7 +79,7 @@ impl Inspect {
 
 impl Report {
     fn new(image: &PolicyImage<'_>) -> Self {
-        let Manifest { task, shape, precision, kappa, provenance, agreement_max_abs, .. } = *image.manifest();
+        let Manifest { task, release, shape, precision, kappa, provenance, agreement_max_abs, .. } = *image.manifest();
         let manifest = image.manifest();
         let rung = |rung: &armor_core::image::Rung| Rung {
             sampler: sampler_name(rung.sampler),
@@ -99,6 +100,7 @@ impl Report {
         };
         Self {
             task: task.into(),
+            release,
             format_version: VERSION,
             image_bytes: image.bytes().len(),
             precision,
@@ -133,7 +135,7 @@ fn hexadecimal(bytes: &[u8]) -> String {
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { shape, provenance, .. } = self;
-        writeln!(f, "task          {}", self.task)?;
+        writeln!(f, "task          {}, release {}", self.task, self.release)?;
         writeln!(f, "image         {} bytes, format {}", self.image_bytes, self.format_version)?;
         writeln!(f, "network       {} state, {} action entries, {:?}", shape.state, shape.action, self.precision)?;
         let Shape { hidden, kappa_hidden, kappa_embedding, steps, .. } = *shape;

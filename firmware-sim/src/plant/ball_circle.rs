@@ -11,8 +11,8 @@
 use armor_core::noise::{Noise, uniform};
 use nalgebra::Vector2;
 
-use super::rolling_ball::{BALL_STATE, FORCE, RollingBall};
-use super::{Outcome, Plant, entry};
+use super::rolling_ball::{self, BALL_STATE, FORCE, RollingBall};
+use super::{Outcome, Plant, Scene, Thing, planar, substeps_before};
 
 /// Sub-steps that an action is held for (`frame_skip`): 0.1 s.
 const SUBSTEPS: usize = 6;
@@ -87,12 +87,16 @@ impl Plant for BallCircle {
         }
     }
 
-    fn step(&mut self, action: &[f32]) -> Outcome {
-        let action = Vector2::new(entry(action, 0), entry(action, 1));
-        for _ in 0..SUBSTEPS {
-            self.ball.substep(FORCE * action, SUBSTEP);
+    fn step_late(&mut self, held: &[f32], action: &[f32], late: f64) -> Outcome {
+        let (held, action) = (planar(held), planar(action));
+        let first = substeps_before(late, SUBSTEPS);
+        for substep in 0..SUBSTEPS {
+            let push = if substep < first { held } else { action };
+            self.ball.substep(FORCE * push, SUBSTEP);
         }
-        let reward = self.circling() - ACTION_PRICE * action.norm();
+        let share = first as f64 / SUBSTEPS as f64;
+        let push = action.norm() + share * (held.norm() - action.norm());
+        let reward = self.circling() - ACTION_PRICE * push;
         Outcome { reward, cost: self.cost(), done: false }
     }
 
@@ -102,6 +106,11 @@ impl Plant for BallCircle {
 
     fn cost(&self) -> f64 {
         if self.ball.position.x.abs() > X_LIMIT { 1.0 } else { 0.0 }
+    }
+
+    fn scene(&self) -> Scene {
+        let things = vec![Thing::Track(RADIUS), Thing::WallX(-X_LIMIT), Thing::WallX(X_LIMIT)];
+        Scene { robot: self.ball.position, radius: rolling_ball::RADIUS, heading: None, things }
     }
 }
 

@@ -6,8 +6,8 @@
 use armor_core::noise::{Noise, uniform};
 use nalgebra::Vector2;
 
-use super::rolling_ball::{BALL_STATE, FORCE, RollingBall};
-use super::{Outcome, Plant, entry};
+use super::rolling_ball::{self, BALL_STATE, FORCE, RollingBall};
+use super::{Outcome, Plant, Scene, Thing, planar, substeps_before};
 
 /// Sub-steps that an action is held for (`frame_skip`): 1/30 s.
 const SUBSTEPS: usize = 4;
@@ -78,13 +78,17 @@ impl Plant for BallRun {
         }
     }
 
-    fn step(&mut self, action: &[f32]) -> Outcome {
-        let action = Vector2::new(entry(action, 0), entry(action, 1));
+    fn step_late(&mut self, held: &[f32], action: &[f32], late: f64) -> Outcome {
+        let (held, action) = (planar(held), planar(action));
         let before = self.potential();
-        for _ in 0..SUBSTEPS {
-            self.ball.substep(FORCE * action, SUBSTEP);
+        let first = substeps_before(late, SUBSTEPS);
+        for substep in 0..SUBSTEPS {
+            let push = if substep < first { held } else { action };
+            self.ball.substep(FORCE * push, SUBSTEP);
         }
-        let reward = self.potential() - before - ACTION_PRICE * action.norm();
+        let share = first as f64 / SUBSTEPS as f64;
+        let push = action.norm() + share * (held.norm() - action.norm());
+        let reward = self.potential() - before - ACTION_PRICE * push;
         Outcome { reward, cost: self.cost(), done: false }
     }
 
@@ -96,6 +100,11 @@ impl Plant for BallRun {
         let outside = self.ball.position.y.abs() > Y_LIMIT;
         let too_fast = self.ball.velocity.norm() > SPEED_LIMIT;
         if outside || too_fast { 1.0 } else { 0.0 }
+    }
+
+    fn scene(&self) -> Scene {
+        let things = vec![Thing::WallY(-Y_LIMIT), Thing::WallY(Y_LIMIT)];
+        Scene { robot: self.ball.position, radius: rolling_ball::RADIUS, heading: None, things }
     }
 }
 

@@ -21,6 +21,8 @@ use std::f64::consts::TAU;
 
 use nalgebra::{Rotation2, Vector2};
 
+use super::substeps_before;
+
 /// Duration of a sub-step in s.
 const SUBSTEP: f64 = 0.002;
 /// Sub-steps that an action is held for (`sim_conf.frameskip_binom_n`).
@@ -108,9 +110,13 @@ impl Point {
         Rotation2::new(-self.heading) * (place - self.position)
     }
 
-    /// Holds an action, thrust and turn, each within -1 and 1, for a control step.
-    pub(super) fn step(&mut self, action: Vector2<f64>) {
-        for _ in 0..SUBSTEPS {
+    /// Holds actions, thrust and turn, each within -1 and 1, for a control
+    /// step: `held` for the share `late` of it, then `action`.
+    pub(super) fn step_late(&mut self, held: Vector2<f64>, action: Vector2<f64>, late: f64) {
+        let first = substeps_before(late, SUBSTEPS);
+        let action_at = |substep| if substep < first { held } else { action };
+        for substep in 0..SUBSTEPS {
+            let action = action_at(substep);
             // Damping at the end of the sub-step: as if the masses were larger.
             let (acceleration, turn) = self.accelerations(action, SUBSTEP);
             self.velocity += SUBSTEP * acceleration;
@@ -118,7 +124,7 @@ impl Point {
             self.position += SUBSTEP * self.velocity;
             self.heading += SUBSTEP * self.spin;
         }
-        (self.acceleration, _) = self.accelerations(action, 0.0);
+        (self.acceleration, _) = self.accelerations(action_at(SUBSTEPS - 1), 0.0);
     }
 
     /// Solves the equations of motion for the accelerations of slides and

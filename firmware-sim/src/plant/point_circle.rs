@@ -10,8 +10,8 @@ use armor_core::noise::{Noise, uniform};
 use nalgebra::{Rotation2, Vector2};
 
 use super::lidar::{self, BINS};
-use super::point::{Point, SENSORS};
-use super::{Outcome, Plant, entry};
+use super::point::{self, Point, SENSORS};
+use super::{Outcome, Plant, Scene, Thing, planar};
 
 /// The start is drawn uniformly within this distance of the origin, in x and in y, in m.
 const START: f64 = 0.8;
@@ -78,8 +78,8 @@ impl Plant for PointCircle {
         }
     }
 
-    fn step(&mut self, action: &[f32]) -> Outcome {
-        self.robot.step(Vector2::new(entry(action, 0), entry(action, 1)));
+    fn step_late(&mut self, held: &[f32], action: &[f32], late: f64) -> Outcome {
+        self.robot.step_late(planar(held), planar(action), late);
         Outcome { reward: self.circling(), cost: self.cost(), done: false }
     }
 
@@ -93,6 +93,11 @@ impl Plant for PointCircle {
 
     fn cost(&self) -> f64 {
         if self.robot.position.x.abs() > X_LIMIT { 1.0 } else { 0.0 }
+    }
+
+    fn scene(&self) -> Scene {
+        let things = vec![Thing::Track(RADIUS), Thing::WallX(-X_LIMIT), Thing::WallX(X_LIMIT)];
+        Scene { robot: self.robot.position, radius: point::RADIUS, heading: Some(self.robot.heading), things }
     }
 }
 

@@ -16,7 +16,7 @@ use nalgebra::{Rotation2, Vector2};
 
 use super::lidar::{self, BINS};
 use super::point::{NOSE_AHEAD, NOSE_HALF, Point, RADIUS, SENSORS};
-use super::{Outcome, Plant, entry};
+use super::{Outcome, Plant, Scene, Thing, planar};
 use layout::{Draws, GOAL_KEEPOUT, Layout, Taken};
 
 /// Within this distance of its middle, in m, the goal is reached.
@@ -120,9 +120,9 @@ impl Plant for PointGoal {
         }
     }
 
-    fn step(&mut self, action: &[f32]) -> Outcome {
+    fn step_late(&mut self, held: &[f32], action: &[f32], late: f64) -> Outcome {
         let before = self.distance();
-        self.robot.step(Vector2::new(entry(action, 0), entry(action, 1)));
+        self.robot.step_late(planar(held), planar(action), late);
         self.push_vase();
         let after = self.distance();
         let mut reward = PROGRESS_REWARD * (before - after);
@@ -152,6 +152,13 @@ impl Plant for PointGoal {
     fn cost(&self) -> f64 {
         let inside = |hazard: &Vector2<f64>| (hazard - self.robot.position).norm() < HAZARD_RADIUS;
         if self.hazards.iter().any(inside) { 1.0 } else { 0.0 }
+    }
+
+    fn scene(&self) -> Scene {
+        let hazards = self.hazards.iter().map(|&hazard| Thing::Hazard(hazard, HAZARD_RADIUS));
+        let others = [Thing::Vase(self.vase, VASE_HALF), Thing::Goal(self.goal, GOAL_RADIUS)];
+        let (robot, heading) = (self.robot.position, Some(self.robot.heading));
+        Scene { robot, radius: RADIUS, heading, things: hazards.chain(others).collect() }
     }
 }
 

@@ -1,6 +1,13 @@
 use super::*;
 use crate::recorded::rows;
 
+impl Point {
+    /// Holds an action for a whole control step.
+    fn hold(&mut self, action: Vector2<f64>) {
+        self.step_late(action, action, 0.0);
+    }
+}
+
 /// From `tests/data/point_steps.py`: a state, an action, and what MuJoCo makes of them.
 fn mujoco_steps() -> Vec<(Point, Vector2<f64>, Point, [f64; SENSORS])> {
     let steps = rows::<f64>(include_str!("../../../tests/data/point_steps.csv")).map(|row| {
@@ -24,7 +31,7 @@ fn a_control_step_is_that_of_mujoco() {
     assert_eq!(steps.len(), 40);
     for (before, action, after, sensors) in steps {
         let mut point = before;
-        point.step(action);
+        point.hold(action);
         assert!((point.position - after.position).norm() < 1e-10, "{before:?} {action:?}: {point:?}, not {after:?}");
         assert!((point.velocity - after.velocity).norm() < 1e-8, "{before:?} {action:?}: {point:?}, not {after:?}");
         assert!((point.heading - after.heading).abs() < 1e-9, "{before:?} {action:?}: {point:?}, not {after:?}");
@@ -57,7 +64,7 @@ fn energy_is_what_the_thrust_put_in_less_what_damping_took() {
     for _ in 0..200 {
         let nose = Vector2::new(point.heading.cos(), point.heading.sin());
         let before = point;
-        point.step(Vector2::new(0.03, 0.0));
+        point.hold(Vector2::new(0.03, 0.0));
         let speed = 0.5 * (before.velocity + point.velocity);
         let time = SUBSTEP * SUBSTEPS as f64;
         put_in += time * (GEAR * 0.03 * nose.dot(&speed) - SLIDE_DAMPING * speed.norm_squared());
@@ -71,14 +78,14 @@ fn energy_is_what_the_thrust_put_in_less_what_damping_took() {
 fn full_actions_reach_the_terminal_speeds() {
     let mut point = Point::at_rest(Vector2::zeros(), 1.0);
     for _ in 0..500 {
-        point.step(Vector2::new(1.0, 0.0));
+        point.hold(Vector2::new(1.0, 0.0));
     }
     assert!((point.velocity.norm() - 1.5).abs() < 1e-3, "{}", point.velocity.norm());
 
     let mut point = Point::at_rest(Vector2::zeros(), 1.0);
     let start = point.heading;
     for _ in 0..500 {
-        point.step(Vector2::new(0.0, 1.0));
+        point.hold(Vector2::new(0.0, 1.0));
     }
     let mean_spin = (point.heading - start) / (500.0 * SUBSTEP * SUBSTEPS as f64);
     assert!((mean_spin - 3.0).abs() < 0.05, "{mean_spin}");
@@ -96,8 +103,8 @@ fn the_robot_knows_no_left_or_right() {
             spin: -before.spin,
             ..before
         };
-        point.step(action);
-        mirrored.step(mirror(action));
+        point.hold(action);
+        mirrored.hold(mirror(action));
         assert!((mirrored.position - mirror(point.position)).norm() < 1e-12);
         assert!((mirrored.heading + point.heading).abs() < 1e-12);
     }
