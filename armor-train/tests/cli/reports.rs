@@ -126,8 +126,8 @@ fn a_run_is_trained_exported_and_scored() {
     }
     assert_eq!(bench.bytes("again.armor"), bench.bytes("policy.armor"));
     assert_eq!(bench.json(&["export", "run", "--release", "7", "-o", "seventh.armor"])["release"], 7);
-    let seventh = AlignedBytes::read(&bench.path("seventh.armor")).unwrap();
-    assert_eq!(PolicyImage::new_checked(seventh.as_slice()).unwrap().manifest().release, 7);
+    let seventh = firmware_sim::memory::AlignedBytes::read(&bench.path("seventh.armor")).unwrap();
+    assert_eq!(armor_core::image::PolicyImage::new_checked(seventh.as_slice()).unwrap().manifest().release, 7);
 }
 
 /// Whatever the policy's distribution is, the image flies it, and an independent program in f64 agrees.
