@@ -26,5 +26,6 @@ if ! { command -v cargo && command -v cc; } >/dev/null; then
 fi
 
 part "workspace" cargo test --workspace --locked --no-fail-fast
+part "embedding" tests/embedding.sh
 part "link" tests/link.sh
 part "bare metal" tests/bare-metal.sh

@@ -3,7 +3,7 @@
 
 use core::fmt;
 
-use armor_core::image::PolicyImage;
+use armor_core::image::{GoldenTrace, PolicyImage};
 use armor_core::units::{Cost, CostLimit};
 
 use crate::controller::Controller;
@@ -74,13 +74,19 @@ pub fn replay<const STATE: usize, const ACTION: usize, const HIDDEN: usize>(
     image: &PolicyImage<'_>,
 ) -> Result<usize, GoldenError> {
     let trace = &image.sections().golden;
+    let (policy, limit) = (Policy::load(image)?, CostLimit::from_cost(trace.limit));
+    fly(&mut Controller::<STATE, ACTION, HIDDEN>::new(policy, limit, trace.seed)?, trace)
+}
+
+/// Flies a trace on a controller at the start of the trace's episode.
+pub(crate) fn fly<const STATE: usize, const ACTION: usize, const HIDDEN: usize>(
+    controller: &mut Controller<'_, STATE, ACTION, HIDDEN>,
+    trace: &GoldenTrace<'_>,
+) -> Result<usize, GoldenError> {
     let rows = trace.rows().len();
     if rows == 0 {
         return Err(GoldenError::Empty);
     }
-    let policy = Policy::load(image)?;
-    let mut controller =
-        Controller::<STATE, ACTION, HIDDEN>::new(policy, CostLimit::from_cost(trace.limit), trace.seed)?;
     for (row, expected) in trace.rows().enumerate() {
         let step = controller.step(expected.state, expected.incurred);
         if step.kappa != expected.kappa {
@@ -99,7 +105,7 @@ pub fn replay<const STATE: usize, const ACTION: usize, const HIDDEN: usize>(
 mod tests {
     use super::*;
     use crate::fixture::{Fixture, Parts, SMALL};
-    use armor_core::image::{GoldenTrace, SectionKind};
+    use armor_core::image::SectionKind;
 
     const ROWS: usize = 4;
 

@@ -15,6 +15,7 @@
 //! | - (the wire to a robot or its simulator, `docs/link.md`) | `link/` |
 //! | - (what a cost monitor reports, charged once) | `meter.rs` |
 //! | - (the budget across resets, in flash) | `journal.rs`, `log.rs` |
+//! | - (the controller in C, feature `capi`) | `capi/`, `include/armor.h` |
 //!
 //! Words: a *policy* is a trained network and its chains, in flash; *kappa* is
 //! the cost that may still be incurred in this episode; a *chain* is a run of
@@ -54,6 +55,8 @@
 #[cfg(any(test, feature = "std"))]
 extern crate std;
 
+#[cfg(feature = "capi")]
+pub mod capi;
 mod controller;
 mod denoiser;
 #[cfg(test)]

@@ -6,6 +6,7 @@
 //! | [`image_faults`] | a damaged or foreign image is named and never flown |
 //! | [`chip_faults`] | a damaged chip boots what was flashed to it, or nothing |
 //! | [`integers`] | a policy in integers is the one in single precision, to what 8 bits can say |
+//! | [`embedding`] | in C and in other loops the controller computes the same bits |
 //! | [`determinism`] | the same seed gives the same bits, on any number of threads and across any stop |
 //! | [`conformance`] | the method's invariants on recorded data, and where each of the others is tested |
 //!
@@ -15,6 +16,7 @@
 mod chip_faults;
 mod conformance;
 mod determinism;
+mod embedding;
 mod fixture;
 mod image_faults;
 mod integers;
