@@ -35,5 +35,5 @@ fi
 echo "embedding: no panic is linked into the C program"
 
 cargo build --locked -p armor-infer --examples
-ARMOR_FLY=$PWD/target/c/fly ARMOR_EXAMPLES=$PWD/${CARGO_TARGET_DIR:-target}/debug/examples \
+ARMOR_C=$PWD/target/c ARMOR_EXAMPLES=$PWD/${CARGO_TARGET_DIR:-target}/debug/examples \
     cargo test --locked -p armor-tests --test across -- --ignored embedding

@@ -21,7 +21,7 @@ static float distance_to_goal(const BallRun *ball) {
 }
 
 void ball_run_reset(BallRun *ball) {
-    const BallRun start = {{0.004f, -0.007f}, {0.0f, 0.0f}};
+    const BallRun start = {{0.0f, 1.8f}, {0.0f, 0.6f}};
     *ball = start;
 }
 

@@ -11,7 +11,7 @@ typedef struct {
     float velocity[2]; /* m/s */
 } BallRun;
 
-/* The ball rests near the origin. */
+/* The ball drifts towards the edge of the track. */
 void ball_run_reset(BallRun *ball);
 
 /* What the sensors say. */

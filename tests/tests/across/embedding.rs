@@ -21,7 +21,7 @@ fn program(variable: &str, name: &str) -> (PathBuf, PathBuf, Run) {
     let built: OsString = std::env::var_os(variable).expect("run tests/embedding.sh");
     let run = Run::new();
     let image = run.path("policy.armor");
-    fs::write(&image, fixture::policy().exported.image.as_slice()).unwrap();
+    fs::write(&image, fixture::policy().exported.bytes.as_slice()).unwrap();
     (Path::new(&built).join(name), image, run)
 }
 
@@ -34,11 +34,11 @@ fn output(command: &mut Command) -> String {
 #[test]
 #[ignore = "needs the C program of tests/embedding.sh"]
 fn embedding_in_c_gives_the_bits_of_the_rust_controller() {
-    let (fly, path, _run) = program("ARMOR_FLY", "");
+    let (fly, path, _run) = program("ARMOR_C", "fly");
     let printed = output(Command::new(fly).arg(&path).args([LIMIT.to_string(), SEED.to_string()]));
 
-    let bytes = AlignedBytes::from(fs::read(&path).unwrap().as_slice());
-    let image = PolicyImage::new_checked(&bytes).unwrap();
+    let bytes = AlignedBytes::read(&path).unwrap();
+    let image = PolicyImage::new_checked(bytes.as_slice()).unwrap();
     let limit = CostLimit::new(LIMIT).unwrap();
     let mut controller = Controller::<STATE, 2, 16>::new(Policy::load(&image).unwrap(), limit, SEED).unwrap();
     let (mut steps, mut costly) = (0, 0);
