@@ -79,6 +79,9 @@ impl fmt::Display for Cost {
 pub struct CostLimit(Cost);
 
 impl CostLimit {
+    /// No cost at all.
+    pub const ZERO: Self = Self(Cost::ZERO);
+
     /// A limit of `d` units of cost, rounded down to a step of `2^-16`.
     ///
     /// # Errors

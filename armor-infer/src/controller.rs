@@ -19,6 +19,7 @@
 //! - *fault*: why the step was not an ordinary one.
 
 use core::fmt;
+use core::mem::MaybeUninit;
 
 use armor_core::budget::Budget;
 use armor_core::noise::Noise;
@@ -111,14 +112,40 @@ impl<'a, const STATE: usize, const ACTION: usize, const HIDDEN: usize> Controlle
     pub fn new(policy: Policy<'a>, limit: CostLimit, seed: u64) -> Result<Self, LoadError> {
         policy.check_capacities(STATE, ACTION, HIDDEN)?;
         policy.check_limit(limit)?;
-        Ok(Self {
-            budget: Budget::new(limit),
-            noise: Noise::new(seed),
-            tick: 0,
-            denoiser: Denoiser::new(&policy),
-            policy,
-            sampler: Sampler::new(),
-        })
+        let mut controller = Self::idle(policy);
+        controller.start(limit, seed);
+        Ok(controller)
+    }
+
+    /// As [`Controller::new`], in place: on a stack that is too small for a controller.
+    ///
+    /// # Errors
+    /// [`LoadError`], as there; nothing was written then.
+    pub fn new_in<'p>(
+        place: &'p mut MaybeUninit<Self>,
+        policy: Policy<'a>,
+        limit: CostLimit,
+        seed: u64,
+    ) -> Result<&'p mut Self, LoadError> {
+        policy.check_capacities(STATE, ACTION, HIDDEN)?;
+        policy.check_limit(limit)?;
+        let controller = place.write(Self::idle(policy));
+        controller.start(limit, seed);
+        Ok(controller)
+    }
+
+    /// A controller whose memory does not suit its policy yet. All that varies
+    /// in it is small, so that the compiler makes it where it is to lie.
+    #[inline(always)]
+    pub(crate) const fn idle(policy: Policy<'a>) -> Self {
+        let (budget, noise) = (Budget::new(CostLimit::ZERO), Noise::new(0));
+        Self { policy, budget, noise, tick: 0, denoiser: Denoiser::idle(), sampler: Sampler::new() }
+    }
+
+    /// The start of the first episode.
+    pub(crate) fn start(&mut self, limit: CostLimit, seed: u64) {
+        self.denoiser.suit(&self.policy);
+        (self.budget, self.noise, self.tick) = (Budget::new(limit), Noise::new(seed), 0);
     }
 
     /// Starts a new episode: the only way to refill the budget.
@@ -127,9 +154,7 @@ impl<'a, const STATE: usize, const ACTION: usize, const HIDDEN: usize> Controlle
     /// [`LoadError::LimitAboveTrainedRange`]; the episode before goes on then.
     pub fn new_episode(&mut self, limit: CostLimit, seed: u64) -> Result<(), LoadError> {
         self.policy.check_limit(limit)?;
-        self.budget = Budget::new(limit);
-        self.noise = Noise::new(seed);
-        self.tick = 0;
+        (self.budget, self.noise, self.tick) = (Budget::new(limit), Noise::new(seed), 0);
         Ok(())
     }
 

@@ -74,12 +74,18 @@ pub fn replay<const STATE: usize, const ACTION: usize, const HIDDEN: usize>(
     image: &PolicyImage<'_>,
 ) -> Result<usize, GoldenError> {
     let trace = &image.sections().golden;
-    let (policy, limit) = (Policy::load(image)?, CostLimit::from_cost(trace.limit));
-    fly(&mut Controller::<STATE, ACTION, HIDDEN>::new(policy, limit, trace.seed)?, trace)
+    let policy = Policy::load(image)?;
+    let mut controller =
+        Controller::<STATE, ACTION, HIDDEN>::new(policy, CostLimit::from_cost(trace.limit), trace.seed)?;
+    replay_on(&mut controller, trace)
 }
 
-/// Flies a trace on a controller at the start of the trace's episode.
-pub(crate) fn fly<const STATE: usize, const ACTION: usize, const HIDDEN: usize>(
+/// As [`replay`], on a controller of the same image that is there already and
+/// starts a new episode: for firmware without the memory of a second one.
+///
+/// # Errors
+/// [`GoldenError`], at the first row that differs.
+pub fn replay_on<const STATE: usize, const ACTION: usize, const HIDDEN: usize>(
     controller: &mut Controller<'_, STATE, ACTION, HIDDEN>,
     trace: &GoldenTrace<'_>,
 ) -> Result<usize, GoldenError> {
@@ -87,6 +93,7 @@ pub(crate) fn fly<const STATE: usize, const ACTION: usize, const HIDDEN: usize>(
     if rows == 0 {
         return Err(GoldenError::Empty);
     }
+    controller.new_episode(CostLimit::from_cost(trace.limit), trace.seed)?;
     for (row, expected) in trace.rows().enumerate() {
         let step = controller.step(expected.state, expected.incurred);
         if step.kappa != expected.kappa {

@@ -10,6 +10,7 @@
 //! | [`host`], [`flight`], [`summary`] | the controller on this computer, in a fixed-rate loop, and its scores |
 //! | [`link`] | the controller behind a wire, for a robot or its simulator |
 //! | [`simulator`] | the simulators that fly the tasks of the paper, over the link |
+//! | [`mcu`] | the controller on emulated microcontrollers, and its instructions counted |
 //! | [`latency`], [`telemetry`] | what each action took; a line a control step |
 //! | [`reference`](mod@reference), [`verify`](mod@verify) | a second evaluation in f64; the checks of an image |
 //! | [`cli`] | the commands |
@@ -38,6 +39,7 @@ pub mod host;
 pub mod image_file;
 pub mod latency;
 pub mod link;
+pub mod mcu;
 pub mod memory;
 pub mod plant;
 #[cfg(test)]

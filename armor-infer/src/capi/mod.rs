@@ -156,7 +156,7 @@ pub unsafe extern "C" fn armor_golden_replay(
         let trace = &image.sections().golden;
         let limit = CostLimit::from_cost(trace.limit);
         let controller = memory.write(ArmorController(Controller::new(Policy::load(&image)?, limit, trace.seed)?));
-        golden::fly(&mut controller.0, trace)?;
+        golden::replay_on(&mut controller.0, trace)?;
         Ok(())
     })
 }

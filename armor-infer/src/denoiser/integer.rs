@@ -99,7 +99,8 @@ impl<const STATE: usize, const HIDDEN: usize> IntegerDenoiser<STATE, HIDDEN> {
         kernel.rescale(sums, bits, network.hidden_3.multiplier, rescale[1], network.bias_3);
         kernel.activate(sums, activate[2], LONG_BITS, codes);
 
-        let weights = network.output.chunks_exact((2 * h).max(1));
+        // As much as 2 tells the compiler what 1 does not, and else it keeps a panic.
+        let weights = network.output.chunks_exact((2 * h).max(2));
         let scales = network.output_factor.iter().zip(network.output_bias);
         for ((eps, weights), (factor, bias)) in eps.iter_mut().zip(weights).zip(scales) {
             let mut parts = [0; 2];

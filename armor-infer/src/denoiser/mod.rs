@@ -25,12 +25,25 @@ pub(crate) enum Denoiser<const STATE: usize, const HIDDEN: usize> {
 }
 
 impl<const STATE: usize, const HIDDEN: usize> Denoiser<STATE, HIDDEN> {
-    /// Memory for a policy within these capacities.
-    pub(crate) const fn new(policy: &Policy<'_>) -> Self {
+    /// Memory that no policy has yet.
+    pub(crate) const fn idle() -> Self {
+        Self::Float(FloatDenoiser::new())
+    }
+
+    /// Becomes memory for a policy within these capacities.
+    pub(crate) fn suit(&mut self, policy: &Policy<'_>) {
         match policy.sections.network {
-            Network::Float(_) => Self::Float(FloatDenoiser::new()),
-            Network::Integer(_) => Self::Integer(IntegerDenoiser::new()),
+            Network::Float(_) => *self = Self::Float(FloatDenoiser::new()),
+            Network::Integer(_) => *self = Self::Integer(IntegerDenoiser::new()),
         }
+    }
+
+    /// Memory for a policy within these capacities.
+    #[cfg(test)]
+    pub(crate) fn new(policy: &Policy<'_>) -> Self {
+        let mut denoiser = Self::idle();
+        denoiser.suit(policy);
+        denoiser
     }
 
     /// Computes what a chain of `policy` needs of the state `[S]` and the

@@ -5,6 +5,8 @@
 //! charged once and refilled once, whatever the line does. A late one is not
 //! answered at all.
 
+use core::mem::MaybeUninit;
+
 use armor_core::image::PolicyImage;
 use armor_core::units::{Cost, CostLimit};
 use heapless::Vec;
@@ -12,6 +14,7 @@ use heapless::Vec;
 use super::frame::{FrameError, decode};
 use super::message::{Answer, Identity, Refusal, Request, VERSION};
 use crate::controller::{Controller, Step};
+use crate::golden::{self, GoldenError};
 use crate::policy::{LoadError, Policy};
 
 /// A controller behind a link.
@@ -37,17 +40,48 @@ impl<'a, const STATE: usize, const ACTION: usize, const HIDDEN: usize> Endpoint<
     /// [`LoadError`] if the policy does not fit the capacities.
     pub fn new(image: &PolicyImage<'a>, max_steps: usize) -> Result<Self, LoadError> {
         let policy = Policy::load(image)?;
-        let nothing = CostLimit::from_cost(Cost::ZERO);
-        Ok(Self {
-            task: image.manifest().task,
-            policy,
-            controller: Controller::new(policy, nothing, 0)?,
-            max_steps,
-            greeted: false,
-            episode: 0,
-            ticks: 0,
-            last: None,
-        })
+        Ok(Self::around(image, policy, max_steps, Controller::new(policy, CostLimit::ZERO, 0)?))
+    }
+
+    /// As [`Endpoint::new`], in place: on a stack that is too small for a controller.
+    ///
+    /// # Errors
+    /// [`LoadError`], as there; nothing was written then.
+    pub fn new_in<'p>(
+        place: &'p mut MaybeUninit<Self>,
+        image: &PolicyImage<'a>,
+        max_steps: usize,
+    ) -> Result<&'p mut Self, LoadError> {
+        let policy = Policy::load(image)?;
+        policy.check_capacities(STATE, ACTION, HIDDEN)?;
+        let endpoint = place.write(Self::around(image, policy, max_steps, Controller::idle(policy)));
+        endpoint.controller.start(CostLimit::ZERO, 0);
+        Ok(endpoint)
+    }
+
+    /// As of [`Controller::idle`].
+    #[inline(always)]
+    const fn around(
+        image: &PolicyImage<'a>,
+        policy: Policy<'a>,
+        max_steps: usize,
+        controller: Controller<'a, STATE, ACTION, HIDDEN>,
+    ) -> Self {
+        let task = image.manifest().task;
+        Self { task, policy, controller, max_steps, greeted: false, episode: 0, ticks: 0, last: None }
+    }
+
+    /// Replays the golden trace on the endpoint's own controller, before the
+    /// first episode; returns the number of rows.
+    ///
+    /// # Errors
+    /// [`GoldenError`]; the image must not fly on this machine then.
+    pub fn replay_golden(&mut self, image: &PolicyImage<'_>) -> Result<usize, GoldenError> {
+        let rows = golden::replay_on(&mut self.controller, &image.sections().golden)?;
+        // Nothing flies before a reset names its limit.
+        self.controller.new_episode(CostLimit::ZERO, 0)?;
+        (self.episode, self.ticks, self.last) = (0, 0, None);
+        Ok(rows)
     }
 
     /// The answer to a received frame, which is overwritten; none where there

@@ -6,10 +6,11 @@
 
 use core::fmt;
 
-use crc::{CRC_32_ISO_HDLC, Crc, Table};
-use postcard::ser_flavors::crc::CrcModifier;
-use postcard::ser_flavors::{Cobs, Slice};
+use crc::{CRC_32_ISO_HDLC, Crc, Digest, Table};
+use postcard::ser_flavors::Flavor;
 use serde::{Deserialize, Serialize};
+
+use super::cobs::{Full, Stuffed, unstuff};
 
 /// Bytes of the checksum behind a message.
 pub const CHECKSUM_BYTES: usize = 4;
@@ -57,11 +58,35 @@ pub const fn frame_bytes(message: usize) -> usize {
 /// # Errors
 /// [`FrameError::Full`]
 pub fn encode<'b>(message: &impl Serialize, buffer: &'b mut [u8]) -> Result<&'b [u8], FrameError> {
-    let frame = Cobs::try_new(Slice::new(buffer)).map_err(|_| FrameError::Full)?;
-    let checked = CrcModifier::new(frame, CRC.digest());
-    postcard::serialize_with_flavor::<_, _, &'b mut [u8]>(message, checked)
-        .map(|frame| &*frame)
-        .map_err(|_| FrameError::Full)
+    let frame = Checked { frame: Stuffed::new(buffer), digest: CRC.digest() };
+    postcard::serialize_with_flavor(message, frame).map(|frame| &*frame).map_err(|_| FrameError::Full)
+}
+
+/// A frame in the making: takes the bytes of a message, and ends with its checksum.
+struct Checked<'b> {
+    frame: Stuffed<'b>,
+    digest: Digest<'static, u32, Table<1>>,
+}
+
+impl<'b> Flavor for Checked<'b> {
+    type Output = &'b mut [u8];
+
+    fn try_push(&mut self, byte: u8) -> postcard::Result<()> {
+        self.digest.update(&[byte]);
+        Ok(self.frame.push(byte)?)
+    }
+
+    fn finalize(mut self) -> postcard::Result<Self::Output> {
+        let checksum = self.digest.finalize().to_le_bytes();
+        checksum.into_iter().try_for_each(|byte| self.frame.push(byte))?;
+        Ok(self.frame.finish(END)?)
+    }
+}
+
+impl From<Full> for postcard::Error {
+    fn from(_: Full) -> Self {
+        Self::SerializeBufferFull
+    }
 }
 
 /// Reads the message of a frame, with or without the zero at its end; the
@@ -70,7 +95,7 @@ pub fn encode<'b>(message: &impl Serialize, buffer: &'b mut [u8]) -> Result<&'b 
 /// # Errors
 /// [`FrameError::Damaged`], [`FrameError::Malformed`]
 pub fn decode<'f, T: Deserialize<'f>>(frame: &'f mut [u8]) -> Result<T, FrameError> {
-    let length = cobs::decode_in_place(frame).map_err(|_| FrameError::Damaged)?;
+    let length = unstuff(frame).ok_or(FrameError::Damaged)?;
     let content = frame.get(..length).ok_or(FrameError::Damaged)?;
     let (message, checksum) = content.split_last_chunk::<CHECKSUM_BYTES>().ok_or(FrameError::Damaged)?;
     if CRC.checksum(message) != u32::from_le_bytes(*checksum) {

@@ -5,7 +5,7 @@
 //!
 //! | here | says |
 //! |---|---|
-//! | `frame.rs` | one message, its CRC-32, COBS, a zero at the end |
+//! | `frame.rs`, `cobs.rs` | one message, its CRC-32, COBS, a zero at the end |
 //! | `message.rs` | what is asked and answered, in postcard |
 //! | `endpoint.rs` | the controller's side: a request in, an answer out |
 //!
@@ -17,6 +17,7 @@
 //! *answer* what comes back; a request is *doubled* if it is the last one
 //! again, and *late* if a newer one was answered.
 
+mod cobs;
 mod endpoint;
 mod frame;
 mod message;

@@ -55,6 +55,36 @@ fn a_hello_has_these_bytes() {
     assert_eq!(frame, [0x01, 0x06, 0x01, 0x69, 0x22, 0xDE, 0x36, 0x00]);
 }
 
+proptest! {
+    /// The crate `cobs` as a second implementation of what is stuffed here.
+    #[test]
+    fn stuffing_is_that_of_the_crate_cobs(bytes in proptest::collection::vec(prop_oneof![0..=1u8, any::<u8>()], 0..700)) {
+        use super::cobs::{Stuffed, unstuff};
+        let (mut buffer, mut theirs) = ([0; 800], [0; 800]);
+        let mut stuffed = Stuffed::new(&mut buffer);
+        for &byte in &bytes {
+            prop_assert!(stuffed.push(byte).is_ok());
+        }
+        let frame = stuffed.finish(0).ok().unwrap();
+        let (content, end) = frame.split_at(frame.len() - 1);
+        prop_assert_eq!(end, [0]);
+        let length = ::cobs::decode(content, &mut theirs).unwrap();
+        prop_assert_eq!(&theirs[..length], bytes.as_slice());
+        let length = ::cobs::encode(&bytes, &mut theirs);
+        prop_assert_eq!(unstuff(&mut theirs[..length]), Some(bytes.len()));
+        prop_assert_eq!(&theirs[..bytes.len()], bytes.as_slice());
+    }
+
+    #[test]
+    fn damage_is_unstuffed_as_by_the_crate_cobs(bytes in proptest::collection::vec(prop_oneof![0..=4u8, any::<u8>()], 0..40)) {
+        let (mut ours, mut theirs) = (bytes.clone(), bytes.clone());
+        let expected = ::cobs::decode_in_place(&mut theirs).ok();
+        prop_assert_eq!(super::cobs::unstuff(&mut ours), expected);
+        let length = expected.unwrap_or_default();
+        prop_assert_eq!(&ours[..length], &theirs[..length]);
+    }
+}
+
 #[test]
 fn the_longest_messages_fit_their_frames() {
     let mut buffer = [0; REQUEST_FRAME];

@@ -3,6 +3,7 @@
 mod bench;
 mod flash;
 mod inspect;
+mod mcu;
 pub mod output;
 mod round_trip;
 mod run;
@@ -39,6 +40,7 @@ enum Command {
     Run(run::Run),
     Bench(bench::Bench),
     Serve(serve::Serve),
+    Mcu(mcu::Mcu),
 }
 
 /// Runs the command of the process's arguments.
@@ -53,6 +55,7 @@ pub fn main() -> ExitCode {
         Command::Run(command) => command.run(output),
         Command::Bench(command) => command.run(output),
         Command::Serve(command) => command.run(output),
+        Command::Mcu(command) => command.run(output),
     })
 }
 

@@ -1,0 +1,34 @@
+//! The board's memories, as the linker script parts them.
+
+use core::ptr::addr_of;
+
+/// What the stack is painted with before anything runs on it.
+const PAINT: u32 = 0xCCCC_CCCC;
+
+unsafe extern "C" {
+    static _policy_start: u8;
+    static _policy_end: u8;
+    static _stack_start: u32;
+    static _stack_end: u32;
+}
+
+/// The flash in which the policy lies, with what follows it.
+pub(crate) fn policy_slot() -> &'static [u8] {
+    // SAFETY: the linker script keeps this memory free, and nothing writes to it.
+    unsafe {
+        let start = addr_of!(_policy_start);
+        core::slice::from_raw_parts(start, addr_of!(_policy_end).addr() - start.addr())
+    }
+}
+
+/// Bytes of the stack that were ever in use: those above the lowest that lost its paint.
+pub(crate) fn stack_high_water() -> u32 {
+    let (lowest, highest) = (addr_of!(_stack_end), addr_of!(_stack_start));
+    let mut place = lowest;
+    // SAFETY: the words between both belong to the stack, and those that are in
+    // use lie above this function's frame.
+    while place < highest && unsafe { place.read_volatile() } == PAINT {
+        place = place.wrapping_add(1);
+    }
+    (highest.addr() - place.addr()) as u32
+}
