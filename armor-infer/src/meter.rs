@@ -36,7 +36,7 @@ pub struct Settled {
     pub incurred: f32,
     /// Steps that were charged as the worst, for they had no report.
     pub missing: u32,
-    /// Reports of steps that had been settled before.
+    /// Reports that came twice, or of steps that had been settled before.
     pub stale: u32,
 }
 
@@ -74,6 +74,7 @@ impl CostMeter {
         for (index, report) in reports.iter().enumerate().filter(|(_, report)| (first..end).contains(&report.step)) {
             let of_step = |other: &&CostReport| other.step == report.step;
             if reports.iter().take(index).any(|other| of_step(&other)) {
+                settled.stale += 1;
                 continue;
             }
             let mut cost = Cost::ZERO;
@@ -119,7 +120,7 @@ mod tests {
     fn each_step_is_charged_once_whenever_its_report_comes() {
         let mut meter = CostMeter::new(cost(1.0));
         assert_eq!(meter.settle(&[], 0), settled(0.0, 0, 0));
-        assert_eq!(meter.settle(&reports(&[(0, 0.25), (0, 0.25)]), 1), settled(0.25, 0, 0));
+        assert_eq!(meter.settle(&reports(&[(0, 0.25), (0, 0.25)]), 1), settled(0.25, 0, 1));
         // Step 1 is late, and was the worst; then it comes, with step 2.
         assert_eq!(meter.settle(&[], 2), settled(1.0, 1, 0));
         assert_eq!(meter.settle(&reports(&[(1, 0.5), (2, 0.5)]), 3), settled(0.5, 0, 1));

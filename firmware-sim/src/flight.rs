@@ -72,6 +72,19 @@ pub enum FlightError {
         /// Action entries of the task.
         expected_action: usize,
     },
+    /// Samples and actions travel too long for the rate.
+    #[error(
+        "a sample and an action that travel for {transport_us} us each do not fit a period of {period_us} us; fly at a lower rate"
+    )]
+    Transport {
+        /// Time each of them travels, in us.
+        transport_us: u64,
+        /// Time between samples, in us.
+        period_us: u64,
+    },
+    /// The chip holds no image that checks.
+    #[error("the chip holds no whole image; flash a good one")]
+    Image,
     /// The controller refuses the policy or the limit.
     #[error("{0}")]
     Load(LoadError),
@@ -227,13 +240,16 @@ impl FlightPlan {
 }
 
 /// What a seed is for: a plant must not start where the controller's noise says.
-enum Use {
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Use {
     Plant,
     Controller,
+    Faults,
+    Mixture,
 }
 
 /// The seed of an episode, independent of how many others are flown.
-fn episode_seed(seed: u64, purpose: Use, episode: u32) -> u64 {
+pub(crate) fn episode_seed(seed: u64, purpose: Use, episode: u32) -> u64 {
     let [low, high, ..] = Noise::new(seed).words(purpose as u32, episode.into(), 0);
     u64::from(high) << 32 | u64::from(low)
 }

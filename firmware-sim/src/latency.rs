@@ -1,4 +1,4 @@
-//! How long the controller took, on this host.
+//! How long the controller took: on this host, or on the model of a board.
 
 use std::fmt;
 use std::time::Duration;
@@ -53,6 +53,17 @@ impl std::iter::Sum for Latency {
 }
 
 impl Latency {
+    /// Ranges of durations, each up to `factor` times those of the one before,
+    /// with what they hold: low and high end in us, and count. Empty ones are left out.
+    pub fn bars(&self, factor: f64) -> impl Iterator<Item = (f64, f64, u64)> {
+        let mut low = 0.0;
+        let bars = self.0.iter_log(1, factor).map(move |bar| {
+            let high = us(bar.value_iterated_to());
+            (std::mem::replace(&mut low, high), high, bar.count_since_last_iteration())
+        });
+        bars.filter(|bar| bar.2 > 0)
+    }
+
     /// Median, 99th percentile and maximum.
     pub fn quantiles(&self) -> Quantiles {
         Quantiles {
@@ -70,12 +81,10 @@ fn us(ns: u64) -> f64 {
 /// One bar a line, 80 columns wide; ranges without durations are left out.
 impl fmt::Display for Latency {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let bars = || self.0.iter_log(1, BAR_FACTOR).filter(|bar| bar.count_since_last_iteration() > 0);
-        let most = bars().map(|bar| bar.count_since_last_iteration()).max().unwrap_or(1);
-        for bar in bars() {
-            let count = bar.count_since_last_iteration();
+        let most = self.bars(BAR_FACTOR).map(|bar| bar.2).max().unwrap_or(1);
+        for (_, high, count) in self.bars(BAR_FACTOR) {
             let length = (count * BAR_WIDTH).div_ceil(most) as usize;
-            writeln!(f, "<= {:>10.1} us {:<50} {count:>10}", us(bar.value_iterated_to()), "#".repeat(length))?;
+            writeln!(f, "<= {high:>10.1} us {:<50} {count:>10}", "#".repeat(length))?;
         }
         Ok(())
     }

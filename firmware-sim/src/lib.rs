@@ -11,7 +11,9 @@
 //! | [`link`] | the controller behind a wire, for a robot or its simulator |
 //! | [`simulator`] | the simulators that fly the tasks of the paper, over the link |
 //! | [`mcu`] | the controller on emulated microcontrollers, and its instructions counted |
-//! | [`latency`], [`telemetry`] | what each action took; a line a control step |
+//! | [`harness`], [`fault`] | a robot's day on a virtual clock: deadlines, watchdog, journal; what may break in it |
+//! | [`latency`], [`telemetry`], [`page`] | what each action took; a line a control step; a flight as a page |
+//! | [`latency_budget`] | a board's deadline as a test of a user's own |
 //! | [`reference`](mod@reference), [`verify`](mod@verify) | a second evaluation in f64; the checks of an image |
 //! | [`cli`] | the commands |
 //! | [`file`](mod@file), [`memory`] | files written whole; bytes on a 16-byte boundary |
@@ -30,17 +32,21 @@ pub mod board;
 pub mod calibrate;
 pub mod chip;
 pub mod cli;
+pub mod fault;
 pub mod file;
 #[cfg(test)]
 mod fixture;
 pub mod flash;
 pub mod flight;
+pub mod harness;
 pub mod host;
 pub mod image_file;
 pub mod latency;
+pub mod latency_budget;
 pub mod link;
 pub mod mcu;
 pub mod memory;
+pub mod page;
 pub mod plant;
 #[cfg(test)]
 mod recorded;

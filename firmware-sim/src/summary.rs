@@ -9,6 +9,9 @@ use crate::flight::{Episode, FlightPlan};
 use crate::latency::{Latency, Quantiles};
 use crate::task;
 
+/// The computer that this program runs on, among boards.
+pub const HOST: &str = "host";
+
 /// Scores over the episodes of a flight; deviations are those of the
 /// population of episodes.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -53,7 +56,9 @@ pub struct FlightSummary {
     pub faults: u64,
     /// Control steps whose latency exceeded the period.
     pub deadline_misses: u64,
-    /// Host time of the controller's step.
+    /// What computed the actions: `host`, whose latency is measured, or a board, whose latency is modelled.
+    pub board: &'static str,
+    /// Time of the controller's step.
     #[serde(flatten)]
     pub latency: Quantiles,
 }
@@ -94,8 +99,14 @@ impl FlightSummary {
             actions: ticks().count() as u64,
             faults: episodes.iter().map(|episode| episode.faults().count() as u64).sum(),
             deadline_misses: ticks().filter(|tick| tick.latency > period).count() as u64,
+            board: HOST,
             latency: latency.quantiles(),
         }
+    }
+
+    /// Whose latency it is.
+    pub fn latency_of(&self) -> String {
+        if self.board == HOST { "host latency".to_owned() } else { format!("modelled latency on {}", self.board) }
     }
 }
 
@@ -124,11 +135,9 @@ impl fmt::Display for FlightSummary {
         }
         writeln!(f, "faults              {:>10} of {} actions", self.faults, self.actions)?;
         writeln!(f, "missed deadlines    {:>10} of {} actions", self.deadline_misses, self.actions)?;
-        write!(
-            f,
-            "host latency        {:>10.1} us median, {:.1} us p99, {:.1} us max",
-            latency.latency_us_p50, latency.latency_us_p99, latency.latency_us_max
-        )
+        let Quantiles { latency_us_p50, latency_us_p99, latency_us_max } = latency;
+        let whose = if self.board == HOST { "host latency" } else { "modelled latency" };
+        write!(f, "{whose:<20}{latency_us_p50:>10.1} us median, {latency_us_p99:.1} us p99, {latency_us_max:.1} us max")
     }
 }
 

@@ -1,7 +1,8 @@
 //! Which charts a report holds.
 
-use super::axis::{Scale, label};
-use super::chart::{Chart, Layer};
+use firmware_sim::page::axis::{Scale, label};
+use firmware_sim::page::chart::{Chart, Layer};
+
 use super::folder::RunFolder;
 use crate::data::{Sorted, ToGo};
 
@@ -31,7 +32,16 @@ pub(super) fn sections(run: &RunFolder) -> Vec<Section<'_>> {
 /// A chart over the rows of `metrics.csv`.
 fn chart<'a>(run: &'a RunFolder, title: &'static str, unit: &'static str, scale: Scale) -> Chart<'a> {
     let steps = run.metrics.get("step");
-    Chart { title, unit, scale, ends: None, steps, layers: Vec::new(), caption: String::new() }
+    Chart {
+        title,
+        across: "training steps",
+        unit,
+        scale,
+        ends: None,
+        steps,
+        layers: Vec::new(),
+        caption: String::new(),
+    }
 }
 
 /// Curves of `metrics.csv`, each with its own colour.
@@ -245,9 +255,9 @@ mod tests {
     use std::collections::BTreeSet;
 
     use super::*;
-    use crate::report::page::STYLE;
     use crate::report::tests::run;
     use crate::run::COLUMNS;
+    use firmware_sim::page::STYLE;
 
     #[test]
     fn every_column_is_drawn() {

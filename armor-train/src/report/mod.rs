@@ -3,16 +3,12 @@
 //! The page needs nothing but itself: no script, no font, no file beside it.
 //!
 //! ```text
-//! folder --folder--> RunFolder --charts--> Chart --plot--> SVG --page--> HTML
-//!                                            \--axis (ticks, numbers)
+//! folder --folder--> RunFolder --charts--> Chart --firmware_sim::page--> SVG --page--> HTML
 //! ```
 
-mod axis;
-mod chart;
 mod charts;
 mod folder;
 mod page;
-mod plot;
 
 pub use folder::{Curves, ReportError, RunFolder};
 pub use page::page;

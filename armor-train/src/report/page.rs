@@ -2,23 +2,17 @@
 
 use std::fmt::Write;
 
-use super::chart::{Chart, Layer};
+use firmware_sim::page::{self, escape, figure};
+
 use super::charts::sections;
 use super::folder::RunFolder;
-use super::plot;
 use crate::config::options::{OPTIONS, plain};
 use crate::run::COLUMNS;
-
-pub(super) const STYLE: &str = include_str!("style.css");
 
 /// The page of a run, complete in itself.
 pub fn page(run: &RunFolder) -> String {
     let name = escape(&run.name);
-    let mut out = format!(
-        "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
-         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-         <title>{name} - ARMOR run</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n"
-    );
+    let mut out = page::head(&format!("{} - ARMOR run", run.name));
     header(run, &name, &mut out);
     for section in sections(run) {
         let _ = write!(out, "<h2>{}</h2>\n<div class=\"grid\">\n", section.title);
@@ -28,12 +22,10 @@ pub fn page(run: &RunFolder) -> String {
     last_row(run, &mut out);
     configuration(run, &mut out);
     provenance(run, &mut out);
-    let _ = write!(
-        out,
-        "<footer>Made by armor-train report {} from metrics.csv, speed.csv, alarms.log, config.toml and \
-         provenance.json.</footer>\n</body>\n</html>\n",
+    out.push_str(&page::foot(&format!(
+        "Made by armor-train report {} from metrics.csv, speed.csv, alarms.log, config.toml and provenance.json.",
         env!("CARGO_PKG_VERSION")
-    );
+    )));
     out
 }
 
@@ -58,24 +50,6 @@ fn header(run: &RunFolder, name: &str, out: &mut String) {
         let _ = writeln!(out, "<li>{}</li>", with_code(&escape(alarm)));
     }
     out.push_str("</ul>\n");
-}
-
-fn figure(chart: &Chart<'_>, out: &mut String) {
-    let _ = write!(out, "<figure>\n<h3>{}</h3>\n<ul class=\"legend\">", chart.title);
-    for layer in chart.layers.iter().filter(|layer| !layer.label().is_empty()) {
-        let sample = match layer {
-            Layer::Line { .. } | Layer::Level { .. } => "M0 5H18",
-            Layer::Area { .. } | Layer::Band { .. } => "M0 0H18V10H0Z",
-        };
-        let _ = write!(
-            out,
-            "<li><svg viewBox=\"0 0 18 10\" aria-hidden=\"true\"><path class=\"{}\" d=\"{sample}\"/></svg>{}</li>",
-            layer.class(),
-            escape(layer.label())
-        );
-    }
-    let _ =
-        write!(out, "</ul>\n{}\n<figcaption>{}</figcaption>\n</figure>\n", plot::svg(chart), escape(&chart.caption));
 }
 
 fn last_row(run: &RunFolder, out: &mut String) {
@@ -160,9 +134,4 @@ fn row(out: &mut String, changed: bool, cells: &[&str]) {
 fn with_code(text: &str) -> String {
     let parts = text.split('`').enumerate();
     parts.map(|(place, part)| if place % 2 == 1 { format!("<code>{part}</code>") } else { part.to_owned() }).collect()
-}
-
-/// Text as it may stand in HTML.
-fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }

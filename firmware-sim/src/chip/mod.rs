@@ -216,6 +216,11 @@ impl Chip {
         self.flash
     }
 
+    /// Erases of each block of the budget's journal.
+    pub fn journal_wear(&self) -> &[u32] {
+        &self.flash.wear()[boot_log::BLOCKS..boot_log::BLOCKS + JOURNAL_BLOCKS]
+    }
+
     /// The bits of a slot's image in flash, for faults; the slot's whole range.
     pub const fn slot_bits(slot: Slot) -> Range<usize> {
         8 * slot.start()..8 * (slot.start() + SLOT_BYTES)

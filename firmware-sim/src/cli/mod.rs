@@ -8,6 +8,8 @@ pub mod output;
 mod round_trip;
 mod run;
 mod serve;
+mod soak;
+mod sweep;
 mod trace;
 mod verify;
 
@@ -17,6 +19,8 @@ use armor_core::schedule::Sampler;
 use armor_core::units::CostLimit;
 use clap::{Parser, Subcommand};
 
+use crate::board::{Board, UnknownBoard};
+use crate::summary::HOST;
 use crate::task::{Task, TaskError};
 use output::Output;
 
@@ -38,6 +42,8 @@ enum Command {
     Trace(trace::Trace),
     Flash(flash::Flash),
     Run(run::Run),
+    Sweep(sweep::Sweep),
+    Soak(soak::Soak),
     Bench(bench::Bench),
     Serve(serve::Serve),
     Mcu(mcu::Mcu),
@@ -53,10 +59,20 @@ pub fn main() -> ExitCode {
         Command::Trace(command) => command.run(output),
         Command::Flash(command) => command.run(output),
         Command::Run(command) => command.run(output),
+        Command::Sweep(command) => command.run(output),
+        Command::Soak(command) => command.run(output),
         Command::Bench(command) => command.run(output),
         Command::Serve(command) => command.run(output),
         Command::Mcu(command) => command.run(output),
     })
+}
+
+/// What computes the actions: this host, or a board.
+type BoardChoice = Option<&'static Board>;
+
+/// A board's name as an argument.
+fn board(name: &str) -> Result<BoardChoice, UnknownBoard> {
+    if name == HOST { Ok(None) } else { Board::named(name).map(Some) }
 }
 
 /// A task's name as an argument.

@@ -2,21 +2,30 @@
 
 use std::fmt;
 use std::path::PathBuf;
+use std::time::Duration;
 
 use armor_core::image::PolicyImage;
 use armor_core::units::CostLimit;
 use serde::Serialize;
 
+use super::BoardChoice;
 use super::output::{CommandResult, Output};
 use crate::chip::{Chip, Slot};
+use crate::fault::Injection;
 use crate::file;
-use crate::flight::{FlightPlan, check, fly};
+use crate::flight::{FlightPlan, check};
+use crate::harness::{Device, RobotFlight, Setup, Tally, fly_all};
+use crate::host::HostController;
 use crate::latency::Latency;
-use crate::summary::FlightSummary;
+use crate::page::flight::{self, Told};
+use crate::summary::{FlightSummary, HOST};
 use crate::task::Task;
 use crate::telemetry;
 
 /// Boot a chip and fly its policy on a native task.
+///
+/// Time is virtual: on a board, an action takes as long as the board's model
+/// says, and the longest chain that ends in time flies.
 #[derive(Debug, clap::Args)]
 pub(super) struct Run {
     /// The chip file.
@@ -25,9 +34,10 @@ pub(super) struct Run {
     /// The task to fly.
     #[arg(long, value_parser = super::task)]
     task: &'static Task,
-    /// What computes the actions.
-    #[arg(long, default_value = "host")]
-    board: Board,
+    /// What computes the actions: this host, at once, or a board, by its model
+    /// (stm32f407, stm32f746, stm32h743, nrf52840, nrf5340, rp2040, rp2350, esp32-c3).
+    #[arg(long, default_value = HOST, value_parser = super::board)]
+    board: BoardChoice,
     /// Control steps a second: the task's rate, which is the default, or a
     /// whole fraction of it.
     #[arg(long, value_name = "HZ")]
@@ -42,33 +52,51 @@ pub(super) struct Run {
     /// Episodes to fly.
     #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..))]
     episodes: u32,
-    /// Decides the starts and the noise.
+    /// Decides the starts, the noise and the faults.
     #[arg(long, default_value_t = 0)]
     seed: u64,
-    /// Write telemetry to this CSV file.
-    #[arg(short, long, value_name = "FILE")]
-    output: Option<PathBuf>,
+    /// A fault to inject, as often as you like: sensor-nan, cost-lost, brown-out
+    /// and others (docs/faults.md), with a severity if the usual one will not do.
+    #[arg(long, value_name = "NAME[=SEVERITY]")]
+    fault: Vec<Injection>,
+    /// Time in us that a sample travels to the controller, and an action to the
+    /// actuators.
+    #[arg(long, value_name = "US", default_value_t = 0)]
+    transport_us: u64,
+    /// Write telemetry to FILE.csv, or a page to FILE.html; both, if given twice.
+    #[arg(short, long, value_name = "FILE", value_parser = written)]
+    output: Vec<Written>,
 }
 
-/// What computes the actions.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, clap::ValueEnum)]
-#[serde(rename_all = "snake_case")]
-enum Board {
-    /// This computer.
-    Host,
+/// A file to write, by its extension.
+#[derive(Clone, Debug)]
+enum Written {
+    Telemetry(PathBuf),
+    Page(PathBuf),
 }
 
 #[derive(Serialize)]
 struct Report {
-    board: Board,
     slot: Slot,
     image_bytes: usize,
     golden_rows: usize,
     #[serde(flatten)]
     summary: FlightSummary,
+    faults_injected: Vec<Injection>,
+    tally: Tally,
     telemetry: Option<PathBuf>,
+    page: Option<PathBuf>,
     #[serde(skip)]
     latency: Latency,
+}
+
+fn written(name: &str) -> Result<Written, &'static str> {
+    let path = PathBuf::from(name);
+    match path.extension().and_then(|extension| extension.to_str()) {
+        Some("csv") => Ok(Written::Telemetry(path)),
+        Some("html") => Ok(Written::Page(path)),
+        _ => Err("name it .csv for telemetry or .html for a page"),
+    }
 }
 
 impl Run {
@@ -84,7 +112,11 @@ impl Run {
         let boot = chip.boot();
         if let Ok(boot) = &boot {
             // A flight that cannot start must not end the trial of a good policy.
-            check(&PolicyImage::new_checked(boot.image.as_slice())?, &plan)?;
+            let image = PolicyImage::new_checked(boot.image.as_slice())?;
+            check(&image, &plan)?;
+            if let Some(board) = self.board {
+                board.check_fit(image.bytes().len(), HostController::RAM_BYTES)?;
+            }
         }
         chip.write(&self.chip)?;
         let boot = boot?;
@@ -93,23 +125,42 @@ impl Run {
         }
         output.note(format_args!("booted slot {}, {} golden rows bit for bit", boot.slot, boot.golden_rows));
         let image = PolicyImage::new_checked(boot.image.as_slice())?;
-        let flight = fly(&image, &plan)?;
+        let setup = Setup::new(&plan, &image, self.board, self.fault.clone())
+            .with_transport(&plan, Duration::from_micros(self.transport_us));
+        let mut device = Device::new(chip, &boot);
+        let flight = fly_all(&mut device, &plan, &setup)?;
+        let mut chip = device.into_chip();
         if boot.on_trial {
             chip.confirm()?;
-            chip.write(&self.chip)?;
             output.note(format_args!("slot {} flew its trial and is confirmed", boot.slot));
         }
-        if let Some(path) = &self.output {
-            file::write(path, telemetry::csv(&flight, task.action).as_bytes())?;
+        chip.write(&self.chip)?;
+        let (mut telemetry, mut page) = (None, None);
+        for file in &self.output {
+            match file {
+                Written::Telemetry(path) => {
+                    let records: Vec<_> = flight.episodes.iter().map(|episode| episode.records.clone()).collect();
+                    file::write(path, telemetry::csv(&records, task.action).as_bytes())?;
+                    telemetry = Some(path.clone());
+                }
+                Written::Page(path) => {
+                    let told = Told { flight: &flight, plan: &plan, setup: &setup, image: &image };
+                    file::write(path, flight::page(&told).as_bytes())?;
+                    page = Some(path.clone());
+                }
+            }
         }
+        let RobotFlight { tally, latency, summary, .. } = flight;
         output.report(&Report {
-            board: self.board,
             slot: boot.slot,
             image_bytes: image.bytes().len(),
             golden_rows: boot.golden_rows,
-            summary: flight.summary,
-            telemetry: self.output,
-            latency: flight.latency,
+            summary,
+            faults_injected: self.fault,
+            tally,
+            telemetry,
+            page,
+            latency,
         })
     }
 }
@@ -117,9 +168,12 @@ impl Run {
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "{}", self.summary)?;
-        if let Some(path) = &self.telemetry {
-            writeln!(f, "telemetry           {}", path.display())?;
+        writeln!(f, "{}", self.tally)?;
+        for (what, path) in [("telemetry", &self.telemetry), ("page", &self.page)] {
+            if let Some(path) = path {
+                writeln!(f, "{what:<20}{}", path.display())?;
+            }
         }
-        write!(f, "\nhost latency of an action\n{}", self.latency.to_string().trim_end())
+        write!(f, "\n{} of an action\n{}", self.summary.latency_of(), self.latency.to_string().trim_end())
     }
 }

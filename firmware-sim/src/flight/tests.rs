@@ -5,7 +5,6 @@ use super::*;
 use crate::fixture::{self, BALL_RUN, Parts, TRAINED_MAX};
 use crate::memory::AlignedBytes;
 use crate::plant::BallRun;
-use crate::telemetry;
 
 fn plan(episodes: u32) -> FlightPlan {
     let limit = CostLimit::new(5.0).unwrap();
@@ -98,21 +97,4 @@ fn a_plan_that_cannot_be_flown_is_refused_by_name() {
     let bytes = Parts::random("SafetyBallRun-v0", BALL_RUN, 1).bytes();
     let refused = fly_bytes(&bytes, &simulator).unwrap_err();
     assert_eq!(refused, FlightError::Task(TaskError::NotNative { task: "SafetyBallRun-v0" }));
-}
-
-#[test]
-fn telemetry_has_a_line_for_every_control_step() {
-    let flight = fly_bytes(&fixture::ball_run(1), &plan(2)).unwrap();
-    let text = telemetry::csv(&flight, 2);
-    let mut lines = text.lines();
-    assert_eq!(lines.next(), Some("episode,tick,time_us,kappa,reward,cost,rung,fault,action_0,action_1"));
-    let rows: Vec<Vec<&str>> = lines.map(|line| line.split(',').collect()).collect();
-    assert_eq!(rows.len(), 200);
-    let (row, tick) = (&rows[103], &flight.episodes[1].ticks[3]);
-    assert_eq!(row[..3], ["1", "3", "99999"]);
-    assert_eq!(row[6..8], ["0", ""]);
-    let numbers: Vec<f64> = [3, 4, 5, 8, 9].iter().map(|&column| row[column].parse().unwrap()).collect();
-    let [first, second] = [tick.step.action[0], tick.step.action[1]];
-    assert_eq!(numbers[..3], [f64::from(tick.step.kappa.to_f32()), tick.reward, tick.cost]);
-    assert_eq!([numbers[3] as f32, numbers[4] as f32], [first, second]);
 }

@@ -78,6 +78,58 @@ fn an_image_is_flashed_and_flown() {
     fits_a_terminal(&bench.run(&RUN));
 }
 
+/// On a board, under faults: the page, telemetry of every control step, and nothing that must not be.
+#[test]
+fn a_board_flies_under_faults_and_the_page_is_written() {
+    let bench = Bench::flashed();
+    let options = ["--board", "stm32f407", "--fault", "sensor-nan=0.1", "--fault", "watchdog-reset=0.02"];
+    let files = ["-o", "flight.csv", "-o", "flight.html"];
+    let report = bench.json(&[&RUN[..], &options, &files].concat());
+    assert_eq!((&report["board"], &report["page"]), (&"stm32f407".into(), &"flight.html".into()));
+    let tally = &report["tally"];
+    assert_eq!((&tally["budget_errors"], &tally["actions_out_of_range"]), (&0.into(), &0.into()));
+    assert!(
+        tally["injected"]["sensor-nan"].as_u64() > Some(0) && tally["noticed"]["reset"].as_u64() > Some(0),
+        "{tally}"
+    );
+    let csv = fs::read_to_string(bench.path("flight.csv")).unwrap();
+    assert_eq!(csv.lines().count(), 1 + 200);
+    assert!(csv.lines().next().unwrap().starts_with("episode,tick,time_us,kappa,left,"));
+    assert!(fs::read_to_string(bench.path("flight.html")).unwrap().ends_with("</html>\n"));
+    fits_a_terminal(&bench.run(&[&RUN[..], &options].concat()));
+}
+
+#[test]
+fn faults_are_swept_into_a_table() {
+    let bench = Bench::new();
+    let arguments = ["sweep", "policy.armor", "--task", "ball-run", "--seeds", "2", "--episodes", "1"];
+    let faults = ["--fault", "sensor-nan=0.5", "--fault", "brown-out", "-o", "table.md"];
+    let report = bench.json(&[&arguments[..], &faults].concat());
+    let rows = report["rows"].as_array().unwrap();
+    assert_eq!((rows.len(), &rows[0]["fault"], &rows[1]["fault"]["kind"]), (3, &Value::Null, &"sensor-nan".into()));
+    assert!(rows[1]["tally"]["noticed"]["state"].as_u64() > Some(50), "{report}");
+    assert!(rows.iter().all(|row| row["episodes"] == 2 && row["tally"]["steps"] == 200));
+    let table = fs::read_to_string(bench.path("table.md")).unwrap();
+    assert_eq!(table.lines().count(), 2 + 3);
+    assert!(table.lines().nth(3).unwrap().starts_with("| sensor-nan | 0.5 | "));
+    fits_a_terminal(&bench.run(&[&arguments[..], &faults].concat()));
+}
+
+#[test]
+fn hours_are_soaked() {
+    let bench = Bench::new();
+    let arguments = ["soak", "policy.armor", "--task", "ball-run", "--hours", "0.1", "--board", "nrf52840"];
+    let report = bench.json(&arguments);
+    // 360 s at 30 Hz, in whole episodes of 100 control steps.
+    assert_eq!((&report["tally"]["steps"], &report["episodes"]), (&10_800.into(), &108.into()));
+    assert_eq!((&report["tally"]["budget_errors"], &report["tally"]["actions_out_of_range"]), (&0.into(), &0.into()));
+    assert!(report["tally"]["injected"].as_object().unwrap().len() > 15, "{report}");
+    let quiet = bench.json(&[&arguments[..], &["--no-faults"]].concat());
+    assert!(quiet["tally"]["injected"].as_object().unwrap().is_empty());
+    fits_a_terminal(&bench.run(&arguments));
+    assert!(bench.misuse(&["soak", "policy.armor", "--task", "ball-run", "--hours", "0"]).contains("above 0"));
+}
+
 #[test]
 fn a_flight_is_repeated_by_its_seed() {
     let bench = Bench::flashed();
@@ -142,7 +194,7 @@ fn a_plant_is_served_on_standard_streams() {
 #[test]
 fn help_fits_a_terminal() {
     let bench = Bench::new();
-    for command in ["inspect", "verify", "trace", "flash", "run", "bench", "serve"] {
+    for command in ["inspect", "verify", "trace", "flash", "run", "sweep", "soak", "bench", "serve"] {
         let output = bench.run(&[command, "--help"]);
         assert_eq!(output.status.code(), Some(0));
         fits_a_terminal(&output);

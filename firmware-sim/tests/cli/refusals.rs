@@ -11,7 +11,10 @@ fn wrong_arguments_are_bad_usage() {
     bench.misuse(&["flash", "policy.armor"]);
     bench.misuse(&["flash", "policy.armor", "--chip", "robot.chip", "--slot", "c"]);
     assert!(bench.misuse(&["run", "--chip", "robot.chip", "--task", "ball-jump"]).contains("no task is called"));
-    assert!(bench.misuse(&[&RUN[..], &["--board", "mps2-an386"]].concat()).contains("possible values: host"));
+    assert!(bench.misuse(&[&RUN[..], &["--board", "arduino"]].concat()).contains("the boards are host, stm32f407"));
+    assert!(bench.misuse(&[&RUN[..], &["--fault", "sensor"]].concat()).contains("the faults are sensor-nan"));
+    assert!(bench.misuse(&[&RUN[..], &["--fault", "overlong=2"]].concat()).contains("above 0 and at most 1"));
+    assert!(bench.misuse(&[&RUN[..], &["-o", "flight.txt"]].concat()).contains(".csv for telemetry or .html"));
     for (option, value) in [("--limit", "-1"), ("--limit", "NaN"), ("--limit", "few"), ("--rate", "fast")] {
         assert!(bench.misuse(&[&RUN[..], &[&format!("{option}={value}")]].concat()).contains(option));
     }
@@ -56,6 +59,7 @@ fn a_flight_that_does_not_fit_is_refused() {
     let bench = Bench::flashed();
     let with = |options: &[&str]| bench.failure(&[&RUN[..], options].concat());
     assert!(with(&["--rate", "7"]).contains("30 Hz or a whole fraction, not at 7"));
+    assert!(with(&["--transport-us", "20000"]).contains("do not fit a period of 33333 us; fly at a lower rate"));
     assert!(with(&["--limit", &(TRAINED_MAX + 1.0).to_string()]).contains("set a limit of at most 40"));
     // None of these was a flight, so the policy is still on trial.
     assert!(text(&bench.run(&RUN).stderr).contains("slot A flew its trial and is confirmed"));

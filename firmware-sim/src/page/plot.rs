@@ -13,7 +13,7 @@ const MARGINS: [f64; 4] = [48.0, 14.0, 22.0, 36.0];
 const COLUMNS: usize = 340;
 
 /// Draws a chart; a legend and a title are the page's.
-pub(super) fn svg(chart: &Chart<'_>) -> String {
+pub fn svg(chart: &Chart<'_>) -> String {
     let [width, height] = SIZE;
     let mut out = format!("<svg viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"{}\">", chart.title);
     let last = chart.steps.last().copied().unwrap_or(0.0);
@@ -77,7 +77,7 @@ impl Frame {
         }
         let _ = write!(out, "<path class=\"axis\" d=\"M{left} {top}V{floor}H{end}\"/>");
         let _ = write!(out, "<text class=\"unit\" x=\"4\" y=\"11\">{}</text>", chart.unit);
-        let _ = write!(out, "<text class=\"unit end\" x=\"{end}\" y=\"{}\">training steps</text>", SIZE[1] - 4.0);
+        let _ = write!(out, "<text class=\"unit end\" x=\"{end}\" y=\"{}\">{}</text>", SIZE[1] - 4.0, chart.across);
     }
 
     fn layer(&self, layer: &Layer<'_>, chart: &Chart<'_>, out: &mut String) {
@@ -86,6 +86,10 @@ impl Frame {
         let class = layer.class();
         let path = match layer {
             Layer::Line { values, .. } => self.line(&thinned(chart, values)),
+            Layer::Dots { values, .. } => {
+                let dot = |(step, value)| format!("M{:.1} {:.1}h0", self.x(step), self.y(value));
+                points(chart, values).map(dot).collect()
+            }
             Layer::Area { low, high, .. } => {
                 let (low, high) = (extremes(chart, low, f64::min), extremes(chart, high, f64::max));
                 let back = low.into_iter().rev();
@@ -147,10 +151,19 @@ fn points(chart: &Chart<'_>, values: &[f64]) -> impl Iterator<Item = (f64, f64)>
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::axis::Scale;
+    use crate::page::axis::Scale;
 
     fn chart<'a>(steps: &'a [f64], layers: Vec<Layer<'a>>) -> Chart<'a> {
-        Chart { title: "t", unit: "u", scale: Scale::Linear, ends: None, steps, layers, caption: String::new() }
+        Chart {
+            title: "t",
+            across: "steps",
+            unit: "u",
+            scale: Scale::Linear,
+            ends: None,
+            steps,
+            layers,
+            caption: String::new(),
+        }
     }
 
     fn line(values: &[f64]) -> Layer<'_> {

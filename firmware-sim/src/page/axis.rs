@@ -2,7 +2,7 @@
 
 /// How numbers are laid out along an axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Scale {
+pub enum Scale {
     /// Equal differences are equally far.
     Linear,
     /// Equal ratios are equally far; only positive numbers have a place.
@@ -11,7 +11,7 @@ pub(super) enum Scale {
 
 /// An axis over a range of numbers.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Axis {
+pub struct Axis {
     scale: Scale,
     /// Ends, as logarithms to base 10 on a logarithmic axis.
     ends: [f64; 2],
@@ -19,7 +19,7 @@ pub(super) struct Axis {
 
 impl Scale {
     /// Whether a number has a place on an axis of this scale.
-    pub(super) fn holds(self, value: f64) -> bool {
+    pub fn holds(self, value: f64) -> bool {
         value.is_finite() && (self == Self::Linear || value > 0.0)
     }
 
@@ -31,7 +31,7 @@ impl Scale {
 impl Axis {
     /// The axis from the smallest to the largest of some numbers, with a margin
     /// of 4 %; none if no number has a place on it.
-    pub(super) fn over(scale: Scale, values: impl Iterator<Item = f64>) -> Option<Self> {
+    pub fn over(scale: Scale, values: impl Iterator<Item = f64>) -> Option<Self> {
         let places = values.filter(|&value| scale.holds(value)).map(|value| scale.apply(value));
         let [low, high] =
             places.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], place| [low.min(place), high.max(place)]);
@@ -44,18 +44,18 @@ impl Axis {
     }
 
     /// The linear axis with these very ends.
-    pub(super) fn exact(low: f64, high: f64) -> Self {
+    pub fn exact(low: f64, high: f64) -> Self {
         Self { scale: Scale::Linear, ends: [low, if high > low { high } else { low + 1.0 }] }
     }
 
     /// Where a number lies, from 0 at the low end to 1 at the high end.
-    pub(super) fn place(&self, value: f64) -> f64 {
+    pub fn place(&self, value: f64) -> f64 {
         let [low, high] = self.ends;
         (self.scale.apply(value) - low) / (high - low)
     }
 
     /// About `count` round numbers along the axis.
-    pub(super) fn ticks(&self, count: usize) -> Vec<f64> {
+    pub fn ticks(&self, count: usize) -> Vec<f64> {
         let [low, high] = self.ends;
         let span = high - low;
         if self.scale == Scale::Log && span >= 0.7 {
@@ -86,7 +86,7 @@ fn multiples(low: f64, high: f64, stride: f64) -> impl Iterator<Item = f64> {
 }
 
 /// A number as a label: three significant digits, `12k`, or a power of ten.
-pub(super) fn label(value: f64) -> String {
+pub fn label(value: f64) -> String {
     let size = value.abs();
     if size == 0.0 {
         return "0".to_owned();

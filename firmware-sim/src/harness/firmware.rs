@@ -1,0 +1,339 @@
+//! What the microcontroller does between a boot and a reset: the loop that a
+//! firmware around `armor-infer` is made of.
+//!
+//! A sample and the cost reports come; the reports are settled; the longest
+//! rung that ends in time answers; the journal covers the budget; the action
+//! goes out. Where no chain answers, the last action is held for a few control
+//! steps, and then the fallback is taken. Now and then the checksum of the
+//! weights in RAM is taken again; where it is wrong, the firmware resets itself.
+
+use std::time::{Duration, Instant};
+
+use armor_core::image::{PolicyImage, Sections};
+use armor_core::noise::{Noise, below, uniform};
+use armor_core::units::{Cost, CostLimit};
+use armor_infer::journal::Journal;
+use armor_infer::meter::CostMeter;
+use armor_infer::{Fault, Policy, Step};
+
+use super::clock::Agenda;
+use super::deadline::Deadline;
+use super::record::{Decision, Notice};
+use super::robot::{Action, Robot};
+use super::{Setup, rung_times};
+use crate::fault::FaultKind;
+use crate::flash::NorModel;
+use crate::flight::{FlightError, FlightPlan};
+use crate::host::{ACTION, HostController};
+
+/// Answers without a chain in which the last action is held.
+const HOLDS: u32 = 3;
+/// Answers after which the weights in RAM are checked.
+const SCRUB: u64 = 50;
+/// Time without power after a brown-out.
+pub(super) const POWER_OFF: Duration = Duration::from_millis(20);
+
+/// What happens. Of events at one time the first here comes first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Event {
+    /// The plant's step ends.
+    Step,
+    /// The controller's timer says that a sample is due.
+    Sample,
+    /// The sample comes to the controller, and the cost reports.
+    Receive,
+    /// The answer is computed.
+    Answer,
+    /// It comes to the actuators.
+    Actuate,
+    /// The watchdog looks.
+    Watchdog,
+    /// The controller is up again.
+    Booted,
+}
+
+/// Why a firmware's loop ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum End {
+    /// The episode is over.
+    Over,
+    /// The controller is reset; without power for a time first.
+    Reset(Duration),
+    /// A bit of the weights in RAM flips: the draw that says which.
+    RamFlip(u32),
+}
+
+/// What the loop keeps in RAM beside the controller.
+pub(super) struct Firmware<'s> {
+    setup: &'s Setup,
+    period: Duration,
+    hold: u32,
+    /// The budget, from which the controller starts.
+    kappa: Cost,
+    meter: CostMeter,
+    /// Plant steps that should have ended by the controller's own clock.
+    due: u32,
+    deadline: Deadline,
+    /// When the sample was taken, what it says, and how many steps were due.
+    sample: Option<(Duration, Option<Vec<f32>>, u32)>,
+    /// What is being computed: when it was sampled, its steps, the action and why.
+    answer: Option<(Duration, usize, Action, Decision)>,
+    /// What is on its way to the actuators.
+    sent: Option<(Action, Decision)>,
+    last: Option<Action>,
+    holds: u32,
+    is_hung: bool,
+    last_kick: Duration,
+    answers: u64,
+    /// Whether the weights in RAM have changed, and whether they are still numbers.
+    weights: Weights,
+    flipped_at: Option<Duration>,
+    jitter: Noise,
+    /// Host time of the controller's steps.
+    pub(super) host_times: Vec<Duration>,
+}
+
+/// What has become of the weights in RAM.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Weights {
+    /// Nothing.
+    Whole,
+    /// They have changed, and the image still checks but for its checksum.
+    Changed,
+    /// They hold what no image may: the network's answer is taken for not finite.
+    Broken,
+}
+
+impl<'s> Firmware<'s> {
+    /// The firmware after a boot.
+    pub(super) fn booted(
+        (plan, setup, hold): (&FlightPlan, &'s Setup, u32),
+        image: &PolicyImage<'_>,
+        (kappa, meter): (Cost, CostMeter),
+        (now, seed): (Duration, u64),
+    ) -> Self {
+        let period = setup.period(plan);
+        let rungs = rung_times(image, setup, plan.max_steps);
+        Self {
+            setup,
+            period,
+            hold,
+            kappa,
+            meter,
+            due: 0,
+            deadline: Deadline::new(rungs, setup.answer_time(plan)),
+            sample: None,
+            answer: None,
+            sent: None,
+            last: None,
+            holds: 0,
+            is_hung: false,
+            last_kick: now,
+            answers: 0,
+            weights: Weights::Whole,
+            flipped_at: None,
+            jitter: Noise::new(seed),
+            host_times: Vec::new(),
+        }
+    }
+
+    /// The weights in RAM have changed.
+    pub(super) const fn set_weights(&mut self, weights: Weights) {
+        self.weights = weights;
+    }
+
+    /// Flies until the episode is over, the controller is reset, or a bit of `image` flips.
+    pub(super) fn fly(
+        &mut self,
+        image: &PolicyImage<'_>,
+        seed: u64,
+        (robot, agenda): (&mut Robot<'_>, &mut Agenda<Event>),
+        journal: &mut Option<Journal<NorModel>>,
+    ) -> Result<End, FlightError> {
+        let policy = Policy::load(image).map_err(FlightError::Load)?;
+        let mut controller =
+            HostController::new(policy, CostLimit::from_cost(self.kappa), seed).map_err(FlightError::Load)?;
+        while let Some(event) = agenda.next() {
+            let now = agenda.now();
+            match event {
+                Event::Step => {
+                    robot.advance();
+                    if robot.is_done() {
+                        return Ok(End::Over);
+                    }
+                    agenda.at(robot.step_end(), Event::Step);
+                }
+                Event::Watchdog if now - self.last_kick >= self.setup.watchdog => {
+                    return Ok(End::Reset(Duration::ZERO));
+                }
+                Event::Watchdog => agenda.at(self.last_kick + self.setup.watchdog, Event::Watchdog),
+                _ if self.is_hung => {}
+                Event::Sample => {
+                    if self.flipped_at != Some(now) && robot.injector.strikes(FaultKind::RamFlip) {
+                        self.flipped_at = Some(now);
+                        agenda.at(now, Event::Sample);
+                        return Ok(End::RamFlip(robot.injector.word(FaultKind::RamFlip, 1)));
+                    }
+                    self.sample(image.sections(), robot, agenda);
+                }
+                Event::Receive => self.receive(image, &mut controller, robot, agenda),
+                Event::Answer => {
+                    if let Some(end) = self.release(image.sections(), robot, agenda, journal) {
+                        return Ok(end);
+                    }
+                }
+                Event::Actuate => {
+                    if let Some((action, decision)) = self.sent.take() {
+                        robot.actuate(now, &action, decision);
+                    }
+                }
+                Event::Booted => {}
+            }
+        }
+        Ok(End::Over)
+    }
+
+    /// The timer says that a sample is due; it also sets the next.
+    fn sample(&mut self, sections: &Sections<'_>, robot: &mut Robot<'_>, agenda: &mut Agenda<Event>) {
+        let now = agenda.now();
+        let due = self.due;
+        self.due += self.hold;
+        let mut next = self.period.mul_f64(1.0 + robot.injector.slowness());
+        match robot.injector.clock_jump() {
+            steps @ 0.. => self.due += steps.unsigned_abs() * self.hold,
+            steps => next += self.period * steps.unsigned_abs(),
+        }
+        agenda.at(now + next, Event::Sample);
+        if robot.injector.strikes(FaultKind::FlashFlip) {
+            robot.flash_flips.push(robot.injector.word(FaultKind::FlashFlip, 1));
+        }
+        if self.sample.is_some() || self.answer.is_some() {
+            robot.note(Notice::Skipped);
+            return;
+        }
+        self.sample = Some((now, robot.sense(sections), due));
+        agenda.at(now + self.setup.transport, Event::Receive);
+    }
+
+    /// Sample and reports are there: the controller steps.
+    fn receive(
+        &mut self,
+        image: &PolicyImage<'_>,
+        controller: &mut HostController<'_>,
+        robot: &mut Robot<'_>,
+        agenda: &mut Agenda<Event>,
+    ) {
+        let now = agenda.now();
+        let Some((sampled, state, due)) = self.sample.take() else { return };
+        let was_lost = self.meter.next().is_none();
+        let settled = self.meter.settle(&robot.take_reports(now), due);
+        if was_lost && let Some(next) = self.meter.next() {
+            self.due = next + self.hold;
+        }
+        if settled.missing > 0 {
+            robot.note(Notice::MissingCost);
+        }
+        if settled.stale > 0 {
+            robot.note(Notice::StaleCost);
+        }
+
+        let steps = self.deadline.steps();
+        let is_broken = self.weights == Weights::Broken;
+        let mut state = state.unwrap_or_default();
+        if is_broken {
+            state.fill(f32::NAN);
+        }
+        let started = Instant::now();
+        let mut step = controller.step_within(&state, settled.incurred, steps);
+        self.host_times.push(started.elapsed());
+        if is_broken && step.fault == Some(Fault::StateNotFinite) {
+            step.fault = Some(Fault::ActionNotFinite);
+        }
+        self.kappa = step.kappa;
+        robot.budget(step.kappa, self.meter.next());
+        if let Some(fault) = step.fault {
+            robot.note(Notice::of(fault));
+        }
+        if robot.injector.strikes(FaultKind::WatchdogReset) {
+            self.is_hung = true;
+            return;
+        }
+        let latency = self.latency(image, &step).mul_f64(robot.injector.stretch());
+        let record = robot.record();
+        (record.rung, record.fault, record.latency) = (step.rung, step.fault, Some(latency));
+        let (action, decision) = self.decide(&step);
+        self.answer = Some((sampled, steps, action, decision));
+        agenda.at(now + latency, Event::Answer);
+    }
+
+    /// What to do with a step: its action, or the last one for a while, or the fallback.
+    fn decide(&mut self, step: &Step<ACTION>) -> (Action, Decision) {
+        if step.rung.is_some() {
+            self.holds = 0;
+            self.last = Some(step.action);
+            return (step.action, Decision::Policy);
+        }
+        self.holds += 1;
+        match self.last.filter(|_| self.holds <= HOLDS) {
+            Some(last) => (last, Decision::Held),
+            None => (step.action, Decision::Fallback),
+        }
+    }
+
+    /// How long a step takes on the board, with the jitter of this answer; no time on the host.
+    fn latency(&mut self, image: &PolicyImage<'_>, step: &Step<ACTION>) -> Duration {
+        self.answers += 1;
+        let modelled = step.rung.and_then(|rung| self.setup.board?.action(image, rung));
+        let share = f64::from(uniform(self.jitter.words(0, self.answers, 0)[0]));
+        modelled.map_or(Duration::ZERO, |action| action.time + (action.worst - action.time).mul_f64(share))
+    }
+
+    /// The answer is there: the journal covers its budget, and it goes out,
+    /// unless it is late.
+    fn release(
+        &mut self,
+        sections: &Sections<'_>,
+        robot: &mut Robot<'_>,
+        agenda: &mut Agenda<Event>,
+        journal: &mut Option<Journal<NorModel>>,
+    ) -> Option<End> {
+        let now = agenda.now();
+        let (sampled, steps, mut action, mut decision) = self.answer.take()?;
+        self.last_kick = now;
+        let arrival = now + self.setup.transport;
+        let is_late = arrival > sampled + self.period;
+        self.deadline.answered(steps, is_late);
+        if robot.injector.strikes(FaultKind::BrownOut) {
+            let draw = robot.injector.word(FaultKind::BrownOut, 1);
+            *journal = journal.take().and_then(|journal| cut_soon(journal, self.setup, draw));
+            let _ = journal.as_mut()?.cover(self.kappa);
+            robot.note(Notice::Journal);
+            return Some(End::Reset(POWER_OFF));
+        }
+        if is_late {
+            robot.note(Notice::Late);
+            return None;
+        }
+        if journal.as_mut().is_none_or(|journal| journal.cover(self.kappa).is_err()) {
+            robot.note(Notice::Journal);
+            decision = Decision::Fallback;
+            for (entry, fallback) in action.iter_mut().zip(sections.action_fallback) {
+                *entry = *fallback;
+            }
+        }
+        if self.answers.is_multiple_of(SCRUB) && self.weights != Weights::Whole {
+            robot.note(Notice::Weights);
+            return Some(End::Reset(Duration::ZERO));
+        }
+        self.sent = Some((action, decision));
+        agenda.at(arrival, Event::Actuate);
+        None
+    }
+}
+
+/// The journal, on a flash whose power fails within its next few operations.
+fn cut_soon(journal: Journal<NorModel>, setup: &Setup, draw: u32) -> Option<Journal<NorModel>> {
+    let mut flash = journal.into_flash();
+    flash.cut_power_after(below(draw, 5).into(), draw.into());
+    Journal::open(flash, crate::chip::JOURNAL, setup.reserve).ok()
+}
