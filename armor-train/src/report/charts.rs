@@ -267,7 +267,7 @@ mod tests {
             .flat_map(|section| &section.charts)
             .flat_map(|chart| &chart.layers)
             .flat_map(|layer| match layer {
-                Layer::Line { values, .. } => vec![values.as_ptr()],
+                Layer::Line { values, .. } | Layer::Dots { values, .. } => vec![values.as_ptr()],
                 Layer::Area { low, high, .. } => vec![low.as_ptr(), high.as_ptr()],
                 Layer::Band { .. } | Layer::Level { .. } => Vec::new(),
             })

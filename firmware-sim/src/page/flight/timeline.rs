@@ -44,7 +44,7 @@ pub(super) fn figure(episode: &RobotEpisode, chains: &[String], out: &mut String
     }
     let end = WIDTH - RIGHT;
     let _ = write!(out, "<path class=\"axis\" d=\"M{LEFT} 4V{floor:.1}H{end}\"/>");
-    let _ = write!(out, "<text class=\"unit end\" x=\"{end}\" y=\"{:.1}\">time in s</text></svg>\n", height - 4.0);
+    let _ = writeln!(out, "<text class=\"unit end\" x=\"{end}\" y=\"{:.1}\">time in s</text></svg>", height - 4.0);
     out.push_str("<figcaption>Blue: the chain whose action came to the actuators. Below, the action before was held, \
                   the fallback taken, or the controller was down; then faults that struck, and what the firmware noticed.\
                   </figcaption>\n</figure>\n");
