@@ -31,8 +31,9 @@ pub const MAX_BIAS: i32 = 1 << 28;
 
 /// Where the table of Mish begins: `mish(-16) = -1.8e-6`.
 pub const TABLE_START: i32 = -(16 << PRE_BITS);
-/// Where it ends: beyond, `mish(z) = z` to within `2e-6`.
-pub const TABLE_END: i32 = 8 << PRE_BITS;
+/// Where it ends. From 8 on `mish(z) = z` to within `2e-6` and its entries are
+/// 0; it goes on so that a machine can saturate its index to 17 bits (SSAT).
+pub const TABLE_END: i32 = 16 << PRE_BITS;
 /// Pre-activations from one entry of the table to the next, as a power of two: 1/32.
 pub const TABLE_STEP_BITS: u32 = PRE_BITS - 5;
 /// The largest pre-activation that is told apart, 128.
@@ -43,7 +44,7 @@ pub const LOWEST_ACTIVATION: i32 = -(5 << (ACTIVATION_BITS - 4));
 /// Shift from a pre-activation to an activation.
 pub const WIDEN_BITS: u32 = ACTIVATION_BITS - PRE_BITS;
 
-/// `mish(z) - max(z, 0)` at `z = -16, -16 + 1/32, ..., 8`, in steps of `2^-16`.
+/// `mish(z) - max(z, 0)` at `z = -16, -16 + 1/32, ..., 16`, in steps of `2^-16`.
 pub static MISH_RESIDUAL: [i16; TABLE_ENTRIES] = residuals();
 const TABLE_ENTRIES: usize = ((TABLE_END - TABLE_START) >> TABLE_STEP_BITS) as usize + 1;
 
@@ -133,7 +134,7 @@ mod tests {
 
     #[test]
     fn every_entry_of_the_table_is_the_nearest_to_the_reference() {
-        assert_eq!(MISH_RESIDUAL.len(), 24 * 32 + 1);
+        assert_eq!(MISH_RESIDUAL.len(), 32 * 32 + 1);
         for (index, entry) in (0..).zip(MISH_RESIDUAL) {
             let z = f64::from(index) / 32.0 - 16.0;
             let exact = 65536.0 * (mish(z) - z.max(0.0));

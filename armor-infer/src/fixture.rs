@@ -1,8 +1,8 @@
 //! Policy images with random weights, for tests.
 
 use armor_core::image::{
-    ALIGNMENT, KappaRange, LevelScales, Manifest, PolicyImage, Precision, Provenance, Rung, SECTION_COUNT, SectionKind,
-    write,
+    ALIGNMENT, KappaRange, Layout, LevelScales, Manifest, PolicyImage, Precision, Provenance, Rung, SECTION_COUNT,
+    SectionKind, write,
 };
 use armor_core::noise::Noise;
 use armor_core::schedule::{Sampler, Schedule};
@@ -30,7 +30,7 @@ pub(crate) struct Fixture {
 /// An image that may still be changed.
 #[derive(Clone)]
 pub(crate) struct Parts {
-    manifest: Manifest<'static>,
+    pub(crate) manifest: Manifest<'static>,
     contents: Vec<Vec<u32>>,
 }
 
@@ -43,6 +43,7 @@ impl Fixture {
             release: 0,
             shape,
             precision: Precision::F32,
+            layout: Layout::Rows,
             kappa: KappaRange { scale: 0.05, trained_max: Cost::from_incurred(TRAINED_MAX).unwrap() },
             schedule: Schedule::vp(shape.steps.into()),
             rungs: Default::default(),
@@ -140,6 +141,35 @@ impl Fixture {
 }
 
 impl Parts {
+    /// The same integers, the weights of two rows in pairs.
+    pub(crate) fn paired(mut self) -> Parts {
+        self.manifest.layout = Layout::Paired;
+        let shape = self.manifest.shape;
+        let [s, a, h, e] = [shape.state, shape.action, shape.hidden, shape.kappa_embedding].map(usize::from);
+        for (kind, matrices) in [
+            (SectionKind::Context, &[(h, s), (h, e)][..]),
+            (SectionKind::Hidden2, &[(h, h)]),
+            (SectionKind::Hidden3, &[(h, h)]),
+            (SectionKind::Output, &[(2 * a, h)]),
+        ] {
+            let words = self.section(kind);
+            let mut rest = std::mem::take(words);
+            for &(rows, columns) in matrices {
+                let others = rest.split_off((rows * columns).div_ceil(4));
+                let bytes: &[i8] = bytemuck::cast_slice(&rest);
+                let mut arranged = vec![0u32; Layout::Paired.bytes(rows, columns) / 4];
+                Layout::Paired.arrange(&bytes[..rows * columns], columns, bytemuck::cast_slice_mut(&mut arranged));
+                words.extend(arranged);
+                // After each matrix of layer 1 come its multipliers.
+                let multipliers = if kind == SectionKind::Context { h } else { 0 };
+                words.extend(&others[..multipliers]);
+                rest = others[multipliers..].to_vec();
+            }
+            words.extend(rest);
+        }
+        self
+    }
+
     /// The words of a section.
     pub(crate) fn section(&mut self, kind: SectionKind) -> &mut Vec<u32> {
         &mut self.contents[kind as usize]

@@ -1,15 +1,16 @@
 //! Policies of the paper's largest size (state 60, action 2, hidden 256, 20
-//! steps) for `firmware-sim bench`: one in each precision, hardly trained, for
-//! what an action takes does not depend on the weights.
+//! steps) for `firmware-sim bench`: one in each precision and layout, hardly
+//! trained, for what an action takes does not depend on the weights. STATE and
+//! HIDDEN make it another size.
 //!
 //! ```text
-//! cargo run --release -p armor-train --example sized_policies -- FOLDER
+//! cargo run --release -p armor-train --example sized_policies -- FOLDER [STATE HIDDEN]
 //! ```
 
 use std::error::Error;
 use std::path::PathBuf;
 
-use armor_core::image::{PolicyImage, Precision};
+use armor_core::image::{Layout, PolicyImage, Precision};
 use armor_core::noise::Noise;
 use armor_train::config::Preset;
 use armor_train::data::{Dataset, Recording};
@@ -17,24 +18,31 @@ use armor_train::export::export;
 use armor_train::quantize::quantize;
 use armor_train::run::{Checkpoint, Watch, Window, fit};
 
-const STATE: usize = 60;
 const ACTION: usize = 2;
 /// Rows of the synthetic recording, in episodes of 100.
 const ROWS: usize = 2000;
 const EPISODE: usize = 100;
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let folder = PathBuf::from(std::env::args().nth(1).ok_or("name a folder")?);
-    let data = Dataset::new(recording())?;
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let folder = PathBuf::from(arguments.first().ok_or("name a folder")?);
+    let size = |at: usize, usual: usize| arguments.get(at).map_or(Ok(usual), |size| size.parse());
+    let (state, hidden) = (size(1, 60)?, size(2, 256)?);
+    let data = Dataset::new(recording(state))?;
     let mut config = Preset::Paper.config("bench", 5.0);
-    (config.steps, config.batch) = (20, 64);
+    (config.steps, config.batch, config.hidden) = (20, 64, hidden);
     let run = folder.join("run");
     fit(&config, &data, &run, false, &mut Unwatched)?;
     let exported = export(&Checkpoint::read(&run)?, &data, None)?;
     std::fs::write(folder.join("f32.armor"), exported.bytes.as_slice())?;
     let float = PolicyImage::new_checked(exported.bytes.as_slice())?;
-    for (precision, name) in [(Precision::Int16x8, "int16x8.armor"), (Precision::Int8, "int8.armor")] {
-        std::fs::write(folder.join(name), quantize(&float, &data, precision)?.bytes.as_slice())?;
+    for (precision, layout, name) in [
+        (Precision::Int16x8, Layout::Rows, "int16x8.armor"),
+        (Precision::Int16x8, Layout::Paired, "int16x8-paired.armor"),
+        (Precision::Int8, Layout::Rows, "int8.armor"),
+        (Precision::Int8, Layout::Paired, "int8-paired.armor"),
+    ] {
+        std::fs::write(folder.join(name), quantize(&float, &data, precision, layout)?.bytes.as_slice())?;
     }
     Ok(())
 }
@@ -49,18 +57,18 @@ impl Watch for Unwatched {
     }
 }
 
-fn recording() -> Recording {
+fn recording(state_dim: usize) -> Recording {
     let normals = |stream: u32, count: usize| {
         let mut values = vec![0.0; count];
         Noise::new(1).fill_normal(stream, 0, &mut values);
         values
     };
     Recording {
-        state_dim: STATE,
+        state_dim,
         action_dim: ACTION,
         sha256: [0; 32],
-        observations: normals(0, ROWS * STATE),
-        next_observations: normals(1, ROWS * STATE),
+        observations: normals(0, ROWS * state_dim),
+        next_observations: normals(1, ROWS * state_dim),
         actions: normals(2, ROWS * ACTION).into_iter().map(|value| value.clamp(-1.0, 1.0)).collect(),
         rewards: normals(3, ROWS),
         costs: normals(4, ROWS).into_iter().map(|value| if value > 1.0 { 1.0 } else { 0.0 }).collect(),

@@ -1,7 +1,7 @@
 //! Policy images with random weights, for this crate's tests and its command-line tests.
 
 use armor_core::image::{
-    KappaRange, Manifest, Precision, Provenance, Quality, Rung, SECTION_COUNT, SectionKind, write,
+    KappaRange, Layout, Manifest, Precision, Provenance, Quality, Rung, SECTION_COUNT, SectionKind, write,
 };
 use armor_core::noise::Noise;
 use armor_core::schedule::{Sampler, Schedule};
@@ -81,6 +81,7 @@ impl Parts {
             release: 0,
             shape,
             precision: Precision::F32,
+            layout: Layout::Rows,
             kappa: KappaRange { scale: 0.05, trained_max: Cost::from_raw((TRAINED_MAX as u32) << 16) },
             schedule,
             rungs: rungs.into_iter().collect(),

@@ -24,7 +24,7 @@ pub enum ImageError {
     Header,
     /// The checksum over manifest and sections is wrong.
     Checksum,
-    /// The manifest cannot be decoded.
+    /// The manifest cannot be decoded, or gives weights in single precision an order.
     Manifest,
     /// A dimension is zero or larger than the format allows.
     Shape,

@@ -45,6 +45,7 @@ impl Parts {
             release: 7,
             shape,
             precision: Precision::F32,
+            layout: Layout::Rows,
             kappa: KappaRange { scale: 0.05, trained_max: Cost::from_raw(80 << 16) },
             schedule,
             rungs: rungs.into_iter().collect(),

@@ -4,6 +4,7 @@ use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
 use super::ImageError;
+use super::layout::Layout;
 use crate::fixed::{LONG_BITS, SHORT_BITS};
 use crate::schedule::{MAX_STEPS, Sampler, Schedule};
 use crate::shape::Shape;
@@ -25,6 +26,8 @@ pub struct Manifest<'a> {
     pub shape: Shape,
     /// Number format of weights and activations.
     pub precision: Precision,
+    /// Order of the weights of an integer network; [`Layout::Rows`] in single precision, which has one order.
+    pub layout: Layout,
     /// How the remaining budget enters the network.
     pub kappa: KappaRange,
     /// The noise schedule behind the chains.
@@ -204,6 +207,9 @@ impl<'a> Manifest<'a> {
     pub(super) fn check(&self) -> Result<(), ImageError> {
         if !self.shape.is_valid() {
             return Err(ImageError::Shape);
+        }
+        if self.precision == Precision::F32 && self.layout != Layout::Rows {
+            return Err(ImageError::Manifest);
         }
         let steps = usize::from(self.shape.steps);
         if self.schedule.steps != steps || steps > MAX_STEPS || self.rungs.is_empty() {

@@ -10,6 +10,7 @@ mod error;
 mod fixture;
 mod golden;
 mod header;
+mod layout;
 mod manifest;
 mod network;
 mod reader;
@@ -19,6 +20,7 @@ mod writer;
 pub use error::ImageError;
 pub use golden::{GoldenRow, GoldenTrace};
 pub use header::{ALIGNMENT, HEADER_BYTES, MAGIC, VERSION};
+pub use layout::Layout;
 pub use manifest::{
     KappaRange, MAX_RUNGS, Manifest, Precision, Provenance, Quality, Rung, SECTION_COUNT, Section, SectionKind,
 };

@@ -1,6 +1,7 @@
 //! The denoiser of an image, in the number format of its precision.
 
 use super::ImageError;
+use super::layout::Layout;
 use super::manifest::{Manifest, SectionKind};
 use super::reader::Reader;
 use super::sections::Dense;
@@ -55,8 +56,8 @@ pub struct IntegerNetwork<'a> {
     pub hidden_3: Rows<'a>,
     /// Bias of layer 3 `[H]`.
     pub bias_3: &'a [i32],
-    /// Output layer, `2 A` rows of `H`: for each output the high part of its
-    /// weights, in steps of 128, then the low part.
+    /// Output layer, `2 A` rows of `H` in the network's layout: for each output
+    /// the high part of its weights, in steps of 128, then the low part.
     pub output: &'a [i8],
     /// Factor of each output's sum `[A]`.
     pub output_factor: &'a [f32],
@@ -72,13 +73,15 @@ pub struct IntegerNetwork<'a> {
     pub time_shift: u32,
     /// Shift of the products with a noisy action, 8 to 16.
     pub action_shift: u32,
+    /// Order of the weights.
+    pub layout: Layout,
     levels: &'a [[u32; LevelScales::WORDS]],
 }
 
 /// The weights of an integer layer and the multiplier of each of its rows.
 #[derive(Clone, Copy, Debug)]
 pub struct Rows<'a> {
-    /// Row after row, an 8-bit weight for each input.
+    /// In the network's layout, an 8-bit weight for each row and input.
     pub weights: &'a [i8],
     /// What [`crate::fixed::rescale`] multiplies a row's sum by, positive.
     pub multiplier: &'a [i32],
@@ -132,24 +135,27 @@ impl<'a> IntegerNetwork<'a> {
         if s.max(h).max(e) > MAX_TERMS {
             return Err(ImageError::Shape);
         }
-        let of_state = bytes(s * h) + h;
-        let context = reader.words(SectionKind::Context, Some(of_state + bytes(e * h) + h + h))?;
+        let layout = manifest.layout;
+        let (s_bytes, e_bytes, h_bytes) = (layout.bytes(h, s), layout.bytes(h, e), layout.bytes(h, h));
+        let output_bytes = layout.bytes(2 * a, h);
+        let of_state = bytes(s_bytes) + h;
+        let context = reader.words(SectionKind::Context, Some(of_state + bytes(e_bytes) + h + h))?;
         let (of_state, rest) = context.split_at_checked(of_state).unwrap_or_default();
-        let (of_kappa, bias) = rest.split_at_checked(bytes(e * h) + h).unwrap_or_default();
-        let context_state = rows(SectionKind::Context, of_state, s * h)?;
-        let context_kappa = rows(SectionKind::Context, of_kappa, e * h)?;
+        let (of_kappa, bias) = rest.split_at_checked(bytes(e_bytes) + h).unwrap_or_default();
+        let context_state = rows(SectionKind::Context, of_state, s_bytes)?;
+        let context_kappa = rows(SectionKind::Context, of_kappa, e_bytes)?;
         let context_bias = biases(SectionKind::Context, bias)?;
         let time_table = shorts(reader.words(SectionKind::TimeTable, Some(halves(n * h)))?, n * h);
         let action_input = shorts(reader.words(SectionKind::ActionInput, Some(halves(a * h)))?, a * h);
         let mut hidden = |kind| {
-            let words = reader.words(kind, Some(bytes(h * h) + 2 * h))?;
-            let (matrix, bias) = words.split_at_checked(bytes(h * h) + h).unwrap_or_default();
-            Ok((rows(kind, matrix, h * h)?, biases(kind, bias)?))
+            let words = reader.words(kind, Some(bytes(h_bytes) + 2 * h))?;
+            let (matrix, bias) = words.split_at_checked(bytes(h_bytes) + h).unwrap_or_default();
+            Ok((rows(kind, matrix, h_bytes)?, biases(kind, bias)?))
         };
         let (hidden_2, bias_2) = hidden(SectionKind::Hidden2)?;
         let (hidden_3, bias_3) = hidden(SectionKind::Hidden3)?;
-        let output = reader.words(SectionKind::Output, Some(bytes(2 * a * h) + 2 * a))?;
-        let (weights, factors) = output.split_at_checked(bytes(2 * a * h)).unwrap_or_default();
+        let output = reader.words(SectionKind::Output, Some(bytes(output_bytes) + 2 * a))?;
+        let (weights, factors) = output.split_at_checked(bytes(output_bytes)).unwrap_or_default();
         let (output_factor, output_bias) =
             floats(SectionKind::Output, factors)?.split_at_checked(a).unwrap_or_default();
 
@@ -168,7 +174,7 @@ impl<'a> IntegerNetwork<'a> {
             bias_2,
             hidden_3,
             bias_3,
-            output: signed(weights, 2 * a * h),
+            output: signed(weights, output_bytes),
             output_factor,
             output_bias,
             state_unit: f32::from_bits(state_unit),
@@ -176,6 +182,7 @@ impl<'a> IntegerNetwork<'a> {
             action_factor: f32::from_bits(action_factor),
             time_shift,
             action_shift,
+            layout,
             levels,
         };
         if network.scales_are_in_range() { Ok(network) } else { Err(ImageError::OutOfRange(kind)) }
@@ -211,7 +218,7 @@ fn shorts(words: &[u32], count: usize) -> &[i16] {
     bytemuck::cast_slice::<u32, i16>(words).get(..count).unwrap_or_default()
 }
 
-/// `count` weights, then the multipliers of their rows.
+/// `count` bytes of weights, then the multipliers of their rows.
 fn rows(kind: SectionKind, words: &[u32], count: usize) -> Result<Rows<'_>, ImageError> {
     let (weights, multiplier) = words.split_at_checked(bytes(count)).unwrap_or_default();
     let multiplier: &[i32] = bytemuck::cast_slice(multiplier);

@@ -274,6 +274,36 @@ fn integers_that_were_written_are_read_back_in_place() {
 }
 
 #[test]
+fn paired_weights_fill_whole_blocks() {
+    let mut parts = Parts::integers(SHAPE);
+    parts.manifest.layout = Layout::Paired;
+    // 5 rows take two blocks of four, and so do 5 or 6 columns.
+    let matrix = |bytes: u32| vec![0; bytes as usize / 4];
+    let fives = vec![1; 5];
+    let hidden = [matrix(8 * 8), fives.clone(), fives.clone()].concat();
+    for (kind, words) in [
+        (SectionKind::Context, [matrix(8 * 4), fives.clone(), matrix(8 * 8), fives.clone(), fives.clone()].concat()),
+        (SectionKind::Hidden2, hidden.clone()),
+        (SectionKind::Hidden3, hidden),
+        (SectionKind::Output, [matrix(4 * 8), fives[..4].to_vec()].concat()),
+    ] {
+        assert_eq!(parts.fault(), ImageError::Section(kind), "in the lengths of rows");
+        *parts.section(kind) = words;
+    }
+    let (mut memory, _) = parts.build();
+    let image = PolicyImage::new_checked(memory.bytes()).unwrap();
+    let Network::Integer(network) = image.sections().network else { panic!("the fixture is in integers") };
+    assert_eq!((network.layout, network.context_state.weights.len(), network.output.len()), (Layout::Paired, 32, 32));
+}
+
+#[test]
+fn weights_in_single_precision_have_one_layout() {
+    let mut parts = Parts::new(SHAPE);
+    parts.manifest.layout = Layout::Paired;
+    assert_eq!(parts.fault(), ImageError::Manifest);
+}
+
+#[test]
 fn an_integer_with_which_a_sum_might_overflow_is_named() {
     let edited = |kind: SectionKind, at: usize, value: u32| {
         let mut parts = Parts::integers(SHAPE);

@@ -232,8 +232,8 @@ fn the_bits_of_an_action_do_not_change() {
 const INTEGERS: [Precision; 2] = [Precision::Int16x8, Precision::Int8];
 
 /// An episode of an integer policy on a kernel: the bits of its actions.
-fn integer_episode(shape: Shape, precision: Precision, kernel: Kernel) -> Vec<u32> {
-    let mut parts = Fixture::integers(shape, precision, 1);
+fn integer_episode(mut parts: Parts, kernel: Kernel) -> Vec<u32> {
+    let shape = parts.manifest.shape;
     parts.set_bounds(-100.0, 100.0);
     let fixture = parts.build();
     let policy = Policy::load(&fixture.image()).unwrap().with_kernel(kernel);
@@ -249,15 +249,17 @@ fn integer_episode(shape: Shape, precision: Precision, kernel: Kernel) -> Vec<u3
 }
 
 #[test]
-fn an_integer_policy_flies_the_same_bits_on_every_kernel() {
+fn an_integer_policy_flies_the_same_bits_on_every_kernel_and_in_both_layouts() {
     // Widths with and without a rest after whole vectors.
     let odd = Shape { state: 61, action: 3, hidden: 139, kappa_hidden: 9, kappa_embedding: 41, steps: 7 };
     for shape in [PAPER, odd, SMALL] {
         for precision in INTEGERS {
-            let portable = integer_episode(shape, precision, Kernel::Portable);
+            let parts = Fixture::integers(shape, precision, 1);
+            let portable = integer_episode(parts.clone(), Kernel::Portable);
             assert!(portable.windows(2).all(|pair| pair[0] != pair[1]), "{portable:?} does not move");
             for kernel in Kernel::available() {
-                assert_eq!(integer_episode(shape, precision, kernel), portable, "{}", kernel.name());
+                assert_eq!(integer_episode(parts.clone(), kernel), portable, "{}", kernel.name());
+                assert_eq!(integer_episode(parts.clone().paired(), kernel), portable, "{}", kernel.name());
             }
         }
     }
@@ -267,7 +269,7 @@ fn an_integer_policy_flies_the_same_bits_on_every_kernel() {
 /// compiler may change them.
 #[test]
 fn the_bits_of_an_integer_action_do_not_change() {
-    let first = |precision| integer_episode(PAPER, precision, Kernel::best())[..2].to_vec();
+    let first = |precision| integer_episode(Fixture::integers(PAPER, precision, 1), Kernel::best())[..2].to_vec();
     assert_eq!(INTEGERS.map(first), [[1_109_228_197, 3_234_605_074], [1_109_194_283, 3_234_741_589]]);
 }
 

@@ -7,7 +7,7 @@
 //! layer 3 always 15 bits, for the output layer is small.
 
 use armor_core::fixed::{LONG_BITS, long_code, rescale};
-use armor_core::image::{IntegerNetwork, LevelScales, Rows};
+use armor_core::image::{IntegerNetwork, Layout, LevelScales, Rows};
 use armor_core::units::Cost;
 
 use super::{NotFinite, front, kappa_embedding, normalised};
@@ -53,13 +53,14 @@ impl<const STATE: usize, const HIDDEN: usize> IntegerDenoiser<STATE, HIDDEN> {
 
         let codes = front(&mut self.state, policy.shape.state.into());
         let unit = encode(normalised(policy, state), network.state_unit, codes)?;
-        add_rows(policy.kernel, &network.context_state, codes, unit, &mut self.sums, context);
+        let (kernel, layout) = (policy.kernel, network.layout);
+        add_rows((kernel, layout), &network.context_state, codes, unit, &mut self.sums, context);
 
         let [first, second] = &mut self.embedding;
         let embedding = kappa_embedding(policy, kappa, first, second);
         let codes = front(&mut self.codes, embedding.len());
         let unit = encode(embedding.iter().copied(), network.kappa_unit, codes)?;
-        add_rows(policy.kernel, &network.context_kappa, codes, unit, &mut self.sums, context);
+        add_rows((kernel, layout), &network.context_kappa, codes, unit, &mut self.sums, context);
         Ok(())
     }
 
@@ -74,7 +75,7 @@ impl<const STATE: usize, const HIDDEN: usize> IntegerDenoiser<STATE, HIDDEN> {
         // An image's chains stay within its levels, and integers have a width.
         let (Some(level), Some(bits)) = (network.level(n), policy.precision.code_bits()) else { return };
         let LevelScales { activate, rescale, last_scale } = level;
-        let (kernel, h) = (policy.kernel, usize::from(policy.shape.hidden));
+        let (kernel, layout, h) = (policy.kernel, network.layout, usize::from(policy.shape.hidden));
         let sums = front(&mut self.sums, h);
         let codes = front(&mut self.codes, h);
 
@@ -91,22 +92,25 @@ impl<const STATE: usize, const HIDDEN: usize> IntegerDenoiser<STATE, HIDDEN> {
         }
         kernel.activate(sums, activate[0], bits, codes);
 
-        kernel.sum_rows(network.hidden_2.weights, codes, bits, sums);
+        kernel.sum_rows(layout, network.hidden_2.weights, codes, bits, sums);
         kernel.rescale(sums, bits, network.hidden_2.multiplier, rescale[0], network.bias_2);
         kernel.activate(sums, activate[1], bits, codes);
 
-        kernel.sum_rows(network.hidden_3.weights, codes, bits, sums);
+        kernel.sum_rows(layout, network.hidden_3.weights, codes, bits, sums);
         kernel.rescale(sums, bits, network.hidden_3.multiplier, rescale[1], network.bias_3);
         kernel.activate(sums, activate[2], LONG_BITS, codes);
 
-        // As much as 2 tells the compiler what 1 does not, and else it keeps a panic.
-        let weights = network.output.chunks_exact((2 * h).max(2));
-        let scales = network.output_factor.iter().zip(network.output_bias);
-        for ((eps, weights), (factor, bias)) in eps.iter_mut().zip(weights).zip(scales) {
-            let mut parts = [0; 2];
-            kernel.sum_rows(weights, codes, LONG_BITS, &mut parts);
-            let [high, low] = parts.map(|sum| sum as f32);
-            *eps = (high * 128.0 + low) * (factor * last_scale) + bias;
+        // Two outputs at a time: a block of the layout is four rows. As much as
+        // a block tells the compiler what 1 does not, and else it keeps a panic.
+        let weights = network.output.chunks(layout.bytes(Layout::BLOCK, h).max(Layout::BLOCK));
+        let scales = network.output_factor.chunks(2).zip(network.output_bias.chunks(2));
+        for ((eps, weights), (factor, bias)) in eps.chunks_mut(2).zip(weights).zip(scales) {
+            let mut parts = [0; Layout::BLOCK];
+            kernel.sum_rows(layout, weights, codes, LONG_BITS, &mut parts);
+            for (((eps, parts), factor), bias) in eps.iter_mut().zip(parts.as_chunks().0).zip(factor).zip(bias) {
+                let [high, low] = parts.map(|sum: i32| sum as f32);
+                *eps = (high * 128.0 + low) * (factor * last_scale) + bias;
+            }
         }
     }
 }
@@ -130,9 +134,16 @@ fn encode(values: impl Iterator<Item = f32> + Clone, unit: f32, codes: &mut [i16
 }
 
 /// Adds a part of layer 1 that is computed once an action.
-fn add_rows(kernel: Kernel, rows: &Rows<'_>, codes: &[i16], unit: i32, sums: &mut [i32], out: &mut [i32]) {
+fn add_rows(
+    (kernel, layout): (Kernel, Layout),
+    rows: &Rows<'_>,
+    codes: &[i16],
+    unit: i32,
+    sums: &mut [i32],
+    out: &mut [i32],
+) {
     let sums = front(sums, out.len());
-    kernel.sum_rows(rows.weights, codes, LONG_BITS, sums);
+    kernel.sum_rows(layout, rows.weights, codes, LONG_BITS, sums);
     for ((out, sum), multiplier) in out.iter_mut().zip(sums).zip(rows.multiplier) {
         *out += rescale(*sum, LONG_BITS, *multiplier, unit);
     }

@@ -1,11 +1,39 @@
 //! Fixed point for every machine: the reference of all integer kernels.
 
 use armor_core::fixed;
+use armor_core::image::Layout;
 
-/// [`Kernel::sum_rows`](super::Kernel::sum_rows).
+/// [`Kernel::sum_rows`](super::Kernel::sum_rows) of [`Layout::Rows`].
 pub(super) fn sum_rows(weights: &[i8], codes: &[i16], sums: &mut [i32]) {
     for (sum, row) in sums.iter_mut().zip(weights.chunks_exact(codes.len().max(1))) {
         *sum = row.iter().zip(codes).map(|(weight, code)| i32::from(*weight) * i32::from(*code)).sum();
+    }
+}
+
+/// [`Kernel::sum_rows`](super::Kernel::sum_rows) of [`Layout::Paired`].
+pub(super) fn sum_pairs(weights: &[i8], codes: &[i16], sums: &mut [i32]) {
+    let group = Layout::Paired.bytes(Layout::BLOCK, codes.len()).max(1);
+    for (sums, group) in sums.chunks_mut(Layout::BLOCK).zip(weights.chunks_exact(group)) {
+        let mut totals = [[0; 2]; Layout::BLOCK / 2];
+        for (codes, block) in
+            codes.chunks(Layout::BLOCK).zip(group.as_chunks::<{ 2 * Layout::BLOCK }>().0.as_chunks().0)
+        {
+            add_block(block, codes, &mut totals);
+        }
+        for (sum, total) in sums.iter_mut().zip(totals.as_flattened()) {
+            *sum = *total;
+        }
+    }
+}
+
+/// Adds a block's products to the sums of its two pairs of rows.
+pub(super) fn add_block(block: &[[i8; 2 * Layout::BLOCK]; 2], codes: &[i16], totals: &mut [[i32; 2]; 2]) {
+    for (pair, [low, high]) in block.iter().zip(totals) {
+        for ([low_byte, high_byte], code) in pair.as_chunks().0.iter().zip(codes) {
+            let code = i32::from(*code);
+            *low += code * i32::from(Layout::Paired.byte(0, *low_byte));
+            *high += code * i32::from(*high_byte);
+        }
     }
 }
 

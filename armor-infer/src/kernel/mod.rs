@@ -12,6 +12,8 @@ mod integer;
 #[cfg(test)]
 mod tests;
 
+use armor_core::image::Layout;
+
 /// The instructions that a policy's arithmetic runs on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kernel {
@@ -83,18 +85,21 @@ impl Kernel {
     }
 
     /// `sums[o]`: the sum of a row's `weights` times `codes`, for `O` rows of
-    /// `I` weights. At most [`fixed::MAX_TERMS`] codes, so that no sum
+    /// `I` weights in `layout`. At most [`fixed::MAX_TERMS`] codes, so that no sum
     /// overflows and their order does not matter; codes of 7 bits lie within 0
     /// and 127, those of 15 bits within -32767 and 32767. Rows without weights
     /// keep their sum.
     ///
     /// [`fixed::MAX_TERMS`]: armor_core::fixed::MAX_TERMS
     #[cfg_attr(not(all(feature = "std", target_arch = "x86_64")), expect(unused_variables))]
-    pub(crate) fn sum_rows(self, weights: &[i8], codes: &[i16], bits: u32, sums: &mut [i32]) {
+    pub(crate) fn sum_rows(self, layout: Layout, weights: &[i8], codes: &[i16], bits: u32, sums: &mut [i32]) {
         match self {
-            Self::Portable => integer::sum_rows(weights, codes, sums),
             #[cfg(all(feature = "std", target_arch = "x86_64"))]
-            Self::Avx2(kernel) => kernel.sum_rows(weights, codes, bits, sums),
+            Self::Avx2(kernel) if layout == Layout::Rows => kernel.sum_rows(weights, codes, bits, sums),
+            _ => match layout {
+                Layout::Rows => integer::sum_rows(weights, codes, sums),
+                Layout::Paired => integer::sum_pairs(weights, codes, sums),
+            },
         }
     }
 

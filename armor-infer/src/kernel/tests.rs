@@ -71,8 +71,21 @@ proptest! {
         let expected: Vec<i64> = weights.chunks_exact(codes.len()).map(sum).collect();
         for kernel in Kernel::available() {
             let mut sums = vec![-1; outputs];
-            kernel.sum_rows(&weights, &codes, bits, &mut sums);
+            kernel.sum_rows(Layout::Rows, &weights, &codes, bits, &mut sums);
             let sums: Vec<i64> = sums.into_iter().map(i64::from).collect();
+            prop_assert_eq!(&sums, &expected, "{}", kernel.name());
+        }
+    }
+
+    #[test]
+    fn the_order_of_the_weights_does_not_show_in_a_sum((weights, codes, bits, outputs) in rows()) {
+        let mut paired = vec![0; Layout::Paired.bytes(outputs, codes.len())];
+        Layout::Paired.arrange(&weights, codes.len(), &mut paired);
+        let mut expected = vec![-1; outputs];
+        Kernel::Portable.sum_rows(Layout::Rows, &weights, &codes, bits, &mut expected);
+        for kernel in Kernel::available() {
+            let mut sums = vec![-1; outputs];
+            kernel.sum_rows(Layout::Paired, &paired, &codes, bits, &mut sums);
             prop_assert_eq!(&sums, &expected, "{}", kernel.name());
         }
     }

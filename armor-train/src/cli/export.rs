@@ -8,6 +8,7 @@ use firmware_sim::cli::output::{CommandResult, Output};
 use firmware_sim::file;
 use serde::Serialize;
 
+use super::misuse;
 use super::run_folder::export_folder;
 use crate::export::{Agreement, released};
 use crate::quantize::{COST_BOUND, Drift, REWARD_BOUND, quantize};
@@ -23,6 +24,10 @@ pub(super) struct Export {
     /// Number format of weights and activations.
     #[arg(long, default_value = "f32")]
     precision: Precision,
+    /// Order of the weights of an integer image: in pairs for a Cortex-M4, M7
+    /// or M33, in rows for all others. Every machine flies both, to the same bits.
+    #[arg(long, default_value = "rows")]
+    layout: Layout,
     /// The image to write.
     #[arg(short, long, value_name = "IMAGE")]
     output: PathBuf,
@@ -55,6 +60,21 @@ impl From<Precision> for image::Precision {
     }
 }
 
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum Layout {
+    Rows,
+    Paired,
+}
+
+impl From<Layout> for image::Layout {
+    fn from(layout: Layout) -> Self {
+        match layout {
+            Layout::Rows => Self::Rows,
+            Layout::Paired => Self::Paired,
+        }
+    }
+}
+
 #[derive(Serialize)]
 struct Report {
     image: PathBuf,
@@ -69,12 +89,15 @@ struct Report {
 
 impl Export {
     pub(super) fn run(self, output: Output) -> CommandResult {
+        if matches!((self.precision, self.layout), (Precision::F32, Layout::Paired)) {
+            misuse(&"weights in f32 have one layout; leave out --layout, or choose --precision int8 or int16x8");
+        }
         let (checkpoint, data, exported) = export_folder(&self.dir, self.data.as_ref(), output)?;
         let (bytes, agreement, drift) = match self.precision {
             Precision::F32 => (exported.bytes, exported.agreement, Drift::default()),
             precision => {
                 let float = PolicyImage::new_checked(exported.bytes.as_slice())?;
-                let quantized = quantize(&float, &data, precision.into())?;
+                let quantized = quantize(&float, &data, precision.into(), self.layout.into())?;
                 (quantized.bytes, quantized.agreement, quantized.drift)
             }
         };

@@ -1,8 +1,8 @@
 //! Makes the image, measures it, and makes it again with what was measured.
 
 use armor_core::image::{
-    KappaRange, MAX_RUNGS, Manifest, PolicyImage, Precision, Provenance, Quality, Rung, SECTION_COUNT, SectionKind,
-    write,
+    KappaRange, Layout, MAX_RUNGS, Manifest, PolicyImage, Precision, Provenance, Quality, Rung, SECTION_COUNT,
+    SectionKind, write,
 };
 use armor_core::schedule::Sampler;
 use armor_core::shape::Shape;
@@ -129,6 +129,7 @@ fn manifest<'a>(checkpoint: &'a Checkpoint, actor: &Actor, data: &Dataset) -> Ma
         release: 0,
         shape,
         precision: Precision::F32,
+        layout: Layout::Rows,
         kappa: KappaRange {
             scale: match config.condition {
                 // The trainer scales costs before they enter a network.

@@ -14,7 +14,7 @@ mod drift;
 mod network;
 mod weights;
 
-use armor_core::image::{Manifest, PolicyImage, Precision, SECTION_COUNT, SectionKind};
+use armor_core::image::{Layout, Manifest, PolicyImage, Precision, SECTION_COUNT, SectionKind};
 use armor_core::units::CostLimit;
 use armor_infer::Policy;
 
@@ -35,16 +35,21 @@ pub struct Quantized {
     pub drift: Drift,
 }
 
-/// The policy of a single-precision image, in integers.
+/// The policy of a single-precision image, in integers, its weights in `layout`.
 ///
 /// # Errors
 /// [`ExportError`]
-pub fn quantize(image: &PolicyImage<'_>, data: &Dataset, precision: Precision) -> Result<Quantized, ExportError> {
+pub fn quantize(
+    image: &PolicyImage<'_>,
+    data: &Dataset,
+    precision: Precision,
+    layout: Layout,
+) -> Result<Quantized, ExportError> {
     let Some(bits) = precision.code_bits() else { return Err(ExportError::NotInteger) };
     let calibration = Calibration::new(image, data)?;
-    let network = network::sections(image, &calibration, bits)?;
+    let network = network::sections(image, &calibration, bits, layout)?;
     let golden = &image.sections().golden;
-    let manifest = Manifest { precision, ..image.manifest().clone() };
+    let manifest = Manifest { precision, layout, ..image.manifest().clone() };
     let contents = |trace: &[u32]| -> [Vec<u32>; SECTION_COUNT] {
         SectionKind::ALL.map(|kind| match kind {
             SectionKind::Golden => trace.to_vec(),

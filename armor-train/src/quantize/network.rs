@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use armor_core::fixed::{ACTIVATION_BITS, LONG_BITS, LOWEST, MAX_BIAS, PRE_BITS};
-use armor_core::image::{Dense, LevelScales, Network, PolicyImage, SectionKind};
+use armor_core::image::{Dense, Layout, LevelScales, Network, PolicyImage, SectionKind};
 use armor_core::noise::MAX_NORMAL;
 
 use super::calibration::Calibration;
@@ -16,11 +16,12 @@ const PRE_ONE: f64 = (1u32 << PRE_BITS) as f64;
 const LONGEST: f64 = ((1u32 << LONG_BITS) - 1) as f64;
 
 /// The sections in which an integer policy differs from `image`, in single
-/// precision; hidden codes have `bits`.
+/// precision; hidden codes have `bits`, and weights lie in `layout`.
 pub(super) fn sections(
     image: &PolicyImage<'_>,
     calibration: &Calibration,
     bits: u32,
+    layout: Layout,
 ) -> Result<HashMap<SectionKind, Vec<u32>>, ExportError> {
     let Network::Float(network) = &image.sections().network else { return Err(ExportError::NotFloat) };
     let shape = image.manifest().shape;
@@ -29,7 +30,8 @@ pub(super) fn sections(
     let of_state = QuantizedRows::new(network.context_state.weights, h);
     let of_kappa = QuantizedRows::new(network.context_kappa, h);
     let context_bias: Vec<f64> = network.context_state.bias.iter().map(|&bias| bias.into()).collect();
-    let context = [rows(&of_state), rows(&of_kappa), biases(SectionKind::Context, &context_bias)?].concat();
+    let context =
+        [rows(&of_state, layout), rows(&of_kappa, layout), biases(SectionKind::Context, &context_bias)?].concat();
 
     let (time_shift, time_table) = time_table(network.time_table)?;
     let bound = image.sections().action_low.iter().chain(image.sections().action_high);
@@ -37,8 +39,8 @@ pub(super) fn sections(
     let action_factor = (LONGEST / largest_action) as f32;
     let (action_shift, action_input) = action_input(network.action_input, action_factor.into())?;
 
-    let (rows_2, hidden_2) = hidden(SectionKind::Hidden2, &network.hidden_2, &calibration.means[0])?;
-    let (rows_3, hidden_3) = hidden(SectionKind::Hidden3, &network.hidden_3, &calibration.means[1])?;
+    let (rows_2, hidden_2) = hidden(SectionKind::Hidden2, &network.hidden_2, &calibration.means[0], layout)?;
+    let (rows_3, hidden_3) = hidden(SectionKind::Hidden3, &network.hidden_3, &calibration.means[1], layout)?;
 
     let unit = |rows: &QuantizedRows| (rescale(rows.scale, 1.0 / LONGEST) as f32).to_bits();
     let mut scales = vec![unit(&of_state), unit(&of_kappa), action_factor.to_bits(), time_shift, action_shift];
@@ -58,7 +60,7 @@ pub(super) fn sections(
         (SectionKind::ActionInput, action_input),
         (SectionKind::Hidden2, hidden_2),
         (SectionKind::Hidden3, hidden_3),
-        (SectionKind::Output, output(&network.output)),
+        (SectionKind::Output, output(&network.output, layout)),
         (SectionKind::Scales, scales),
     ]))
 }
@@ -87,17 +89,22 @@ fn integer(kind: SectionKind, value: f64) -> Result<i32, ExportError> {
 }
 
 /// A hidden layer's integers, and its section.
-fn hidden(kind: SectionKind, layer: &Dense<'_>, means: &[f64]) -> Result<(QuantizedRows, Vec<u32>), ExportError> {
+fn hidden(
+    kind: SectionKind,
+    layer: &Dense<'_>,
+    means: &[f64],
+    layout: Layout,
+) -> Result<(QuantizedRows, Vec<u32>), ExportError> {
     let quantized = QuantizedRows::new(layer.weights, layer.bias.len());
     let shortfall = quantized.shortfall(layer.weights, means);
     let shifts = quantized.sums.iter().zip(&shortfall).map(|(sum, shortfall)| LOWEST * sum + shortfall);
     let bias: Vec<f64> = layer.bias.iter().zip(shifts).map(|(&bias, shift)| f64::from(bias) + shift).collect();
-    let section = [rows(&quantized), biases(kind, &bias)?].concat();
+    let section = [rows(&quantized, layout), biases(kind, &bias)?].concat();
     Ok((quantized, section))
 }
 
 /// The output layer with weights of 15 bits, in a high and a low part.
-fn output(layer: &Dense<'_>) -> Vec<u32> {
+fn output(layer: &Dense<'_>, layout: Layout) -> Vec<u32> {
     const HIGHEST: f64 = 127.0 * 128.0;
     let outputs = layer.bias.len();
     let (mut codes, mut factors, mut biases) = (Vec::new(), Vec::new(), Vec::new());
@@ -114,7 +121,7 @@ fn output(layer: &Dense<'_>) -> Vec<u32> {
         factors.push(factor.to_bits());
         biases.push(((f64::from(bias) + LOWEST * sum) as f32).to_bits());
     }
-    [pack_bytes(&codes), factors, biases].concat()
+    [matrix(&codes, 2 * outputs, layout), factors, biases].concat()
 }
 
 /// The time table in 16 bits, with the least shift that holds it.
@@ -142,9 +149,17 @@ fn biases(kind: SectionKind, biases: &[f64]) -> Result<Vec<u32>, ExportError> {
         .collect()
 }
 
-fn rows(rows: &QuantizedRows) -> Vec<u32> {
+fn rows(rows: &QuantizedRows, layout: Layout) -> Vec<u32> {
     let multiplier = rows.multiplier.iter().map(|&multiplier| multiplier as u32).collect();
-    [pack_bytes(&rows.codes), multiplier].concat()
+    [matrix(&rows.codes, rows.multiplier.len(), layout), multiplier].concat()
+}
+
+/// The codes of `rows`, given row after row, as an image has them.
+fn matrix(codes: &[i8], rows: usize, layout: Layout) -> Vec<u32> {
+    let columns = codes.len() / rows;
+    let mut bytes = vec![0; layout.bytes(rows, columns)];
+    layout.arrange(codes, columns, &mut bytes);
+    pack_bytes(&bytes)
 }
 
 /// Bytes as words, the last one filled up with zeros.

@@ -3,7 +3,7 @@
 use std::fmt::{self, Write};
 use std::path::PathBuf;
 
-use armor_core::image::{Manifest, PolicyImage, Precision, Quality, SectionKind, VERSION};
+use armor_core::image::{Layout, Manifest, PolicyImage, Precision, Quality, SectionKind, VERSION};
 use armor_core::shape::Shape;
 use serde::Serialize;
 
@@ -25,6 +25,7 @@ struct Report {
     format_version: u16,
     image_bytes: usize,
     precision: Precision,
+    layout: Layout,
     #[serde(flatten)]
     shape: Shape,
     rungs: Vec<Rung>,
@@ -79,7 +80,8 @@ impl Inspect {
 
 impl Report {
     fn new(image: &PolicyImage<'_>) -> Self {
-        let Manifest { task, release, shape, precision, kappa, provenance, agreement_max_abs, .. } = *image.manifest();
+        let Manifest { task, release, shape, precision, layout, kappa, provenance, agreement_max_abs, .. } =
+            *image.manifest();
         let manifest = image.manifest();
         let rung = |rung: &armor_core::image::Rung| Rung {
             sampler: sampler_name(rung.sampler),
@@ -104,6 +106,7 @@ impl Report {
             format_version: VERSION,
             image_bytes: image.bytes().len(),
             precision,
+            layout,
             shape,
             rungs: manifest.rungs.iter().map(rung).collect(),
             kappa_scale: kappa.scale,
@@ -137,7 +140,8 @@ impl fmt::Display for Report {
         let Self { shape, provenance, .. } = self;
         writeln!(f, "task          {}, release {}", self.task, self.release)?;
         writeln!(f, "image         {} bytes, format {}", self.image_bytes, self.format_version)?;
-        writeln!(f, "network       {} state, {} action entries, {:?}", shape.state, shape.action, self.precision)?;
+        write!(f, "network       {} state, {} action entries, {:?}", shape.state, shape.action, self.precision)?;
+        writeln!(f, "{}", if self.layout == Layout::Paired { ", weights in pairs" } else { "" })?;
         let Shape { hidden, kappa_hidden, kappa_embedding, steps, .. } = *shape;
         writeln!(f, "              3 layers of {hidden}, kappa 1-{kappa_hidden}-{kappa_hidden}-{kappa_embedding}")?;
         writeln!(f, "              {steps} noise levels")?;

@@ -3,7 +3,7 @@
 //! weights out as matrices of whole numbers and computes its own table of Mish.
 
 use armor_core::budget_map::BudgetMap;
-use armor_core::image::{Dense, IntegerNetwork, PolicyImage, Precision, Rows};
+use armor_core::image::{Dense, IntegerNetwork, Layout, PolicyImage, Precision, Rows};
 use armor_core::mish::mish;
 use armor_core::schedule::ChainStep;
 use armor_core::units::Cost;
@@ -60,7 +60,7 @@ impl IntegerReference {
         };
         let wide =
             |values: &[i16], rows| DMatrix::from_iterator(rows, values.len() / rows, values.iter().map(|&v| v.into()));
-        let parts = DMatrix::from_row_iterator(2 * a, h, network.output.iter().map(|&w| i64::from(w)));
+        let parts = matrix(network.output, network.layout, 2 * a, h);
         let residual = |index: u32| {
             let z = f64::from(index) / 32.0 - 16.0;
             ((z * z.exp().ln_1p().tanh() - z.max(0.0)) * 65536.0).round() as i64
@@ -80,14 +80,14 @@ impl IntegerReference {
                 .unwrap_or_default(),
             kappa_scale: manifest.kappa.scale,
             kappa: numbers.kappa.map(|dense| by_output(&dense)),
-            context_state: layer(&network.context_state, s),
-            context_kappa: layer(&network.context_kappa, e),
+            context_state: layer(&network.context_state, network.layout, s),
+            context_kappa: layer(&network.context_kappa, network.layout, e),
             context_bias: whole(network.context_bias),
             time: wide(network.time_table, h) * (1 << network.time_shift),
             action_input: wide(network.action_input, h),
             hidden: [
-                (layer(&network.hidden_2, h), whole(network.bias_2)),
-                (layer(&network.hidden_3, h), whole(network.bias_3)),
+                (layer(&network.hidden_2, network.layout, h), whole(network.bias_2)),
+                (layer(&network.hidden_3, network.layout, h), whole(network.bias_3)),
             ],
             output: DMatrix::from_fn(a, h, |row, column| 128 * parts[(2 * row, column)] + parts[(2 * row + 1, column)]),
             output_factor: network.output_factor.into(),
@@ -208,12 +208,23 @@ fn hoisted(layer: &Layer, values: &[f32], unit: f32) -> DVector<i64> {
     (&layer.weights * codes).component_mul(&layer.multiplier).map(|product| high(high(product) * rescale))
 }
 
-fn layer(rows: &Rows<'_>, inputs: usize) -> Layer {
-    let weights = rows.weights.iter().map(|&weight| i64::from(weight));
-    Layer {
-        weights: DMatrix::from_row_iterator(rows.multiplier.len(), inputs, weights),
-        multiplier: whole(rows.multiplier),
-    }
+fn layer(rows: &Rows<'_>, layout: Layout, inputs: usize) -> Layer {
+    let weights = matrix(rows.weights, layout, rows.multiplier.len(), inputs);
+    Layer { weights, multiplier: whole(rows.multiplier) }
+}
+
+/// The weights as whole numbers; paired, a half-word is `256 high + low + 128`.
+fn matrix(bytes: &[i8], layout: Layout, rows: usize, columns: usize) -> DMatrix<i64> {
+    let byte = |at: usize| i64::from(bytes[at]);
+    DMatrix::from_fn(rows, columns, |row, column| match layout {
+        Layout::Rows => byte(row * columns + column),
+        Layout::Paired => {
+            let block = 16 * ((row / 4) * columns.div_ceil(4) + column / 4);
+            let pair = block + 8 * (row / 2 % 2) + 2 * (column % 4);
+            let half_word = 256 * byte(pair + 1) + byte(pair).rem_euclid(256);
+            if row % 2 == 0 { half_word.rem_euclid(256) - 128 } else { half_word.div_euclid(256) }
+        }
+    })
 }
 
 fn whole(values: &[i32]) -> DVector<i64> {

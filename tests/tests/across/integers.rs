@@ -1,7 +1,7 @@
 //! A policy in integers is the one in single precision, as far as 8-bit
 //! weights can say it, and passes every check that the other passes.
 
-use armor_core::image::{PolicyImage, Precision};
+use armor_core::image::{Layout, PolicyImage, Precision};
 use armor_train::export::ExportError;
 use armor_train::quantize::{Quantized, quantize};
 use firmware_sim::host;
@@ -10,8 +10,12 @@ use firmware_sim::verify::verify;
 use crate::fixture::{policy, shipped};
 
 fn quantized(precision: Precision) -> Quantized {
+    laid_out(precision, Layout::Rows)
+}
+
+fn laid_out(precision: Precision, layout: Layout) -> Quantized {
     let image = PolicyImage::new_checked(policy().exported.bytes.as_slice()).unwrap();
-    quantize(&image, shipped(), precision).unwrap()
+    quantize(&image, shipped(), precision, layout).unwrap()
 }
 
 #[test]
@@ -43,11 +47,25 @@ fn it_passes_every_check_with_no_difference_at_all() {
     }
 }
 
+/// The golden trace holds the bits of the actions, the quality card those of whole flights.
+#[test]
+fn weights_in_pairs_fly_the_same_actions() {
+    for precision in [Precision::Int16x8, Precision::Int8] {
+        let [rows, paired] = [Layout::Rows, Layout::Paired].map(|layout| laid_out(precision, layout));
+        assert!(verify(paired.bytes.as_slice(), 1).passed);
+        let [rows, paired] = [&rows, &paired].map(|quantized| host::check(quantized.bytes.as_slice()).unwrap().image);
+        assert_eq!(paired.manifest().layout, Layout::Paired);
+        assert_eq!(paired.manifest().quality, rows.manifest().quality);
+        let trace = armor_core::image::SectionKind::Golden;
+        assert_eq!(paired.words(trace), rows.words(trace));
+    }
+}
+
 #[test]
 fn what_is_in_integers_already_is_not_quantised_again() {
     let quantized = quantized(Precision::Int8);
     let image = PolicyImage::new_checked(quantized.bytes.as_slice()).unwrap();
-    assert!(matches!(quantize(&image, shipped(), Precision::Int8), Err(ExportError::NotFloat)));
+    assert!(matches!(quantize(&image, shipped(), Precision::Int8, Layout::Rows), Err(ExportError::NotFloat)));
     let float = PolicyImage::new_checked(policy().exported.bytes.as_slice()).unwrap();
-    assert!(matches!(quantize(&float, shipped(), Precision::F32), Err(ExportError::NotInteger)));
+    assert!(matches!(quantize(&float, shipped(), Precision::F32, Layout::Rows), Err(ExportError::NotInteger)));
 }
