@@ -14,13 +14,20 @@
 /// the sum and needs no conversion.
 #[inline(always)]
 pub fn exp(x: f32) -> f32 {
+    let clipped = if x < 88.0 { x } else { 88.0 };
+    let value = exp_below(clipped);
+    if x.is_nan() { x } else { value }
+}
+
+/// [`exp`] of what is no NaN and at most 88.
+#[inline(always)]
+fn exp_below(x: f32) -> f32 {
     const MAGIC: f32 = 12_582_912.0; // 1.5 * 2^23
     // ln 2 in two parts; the first has 9 trailing zero bits, so its product with n is exact.
     const LN2_HIGH: f32 = 355.0 / 512.0;
     const LN2_LOW: f32 = -2.121_944_4e-4;
 
-    let clipped = if x < 88.0 { x } else { 88.0 };
-    let clipped = if clipped > -87.0 { clipped } else { -87.0 };
+    let clipped = if x > -87.0 { x } else { -87.0 };
     let shifted = clipped * core::f32::consts::LOG2_E + MAGIC;
     let n = shifted - MAGIC;
     let r = (clipped - n * LN2_HIGH) - n * LN2_LOW;
@@ -36,19 +43,13 @@ pub fn exp(x: f32) -> f32 {
 
     let power = f32::from_bits(shifted.to_bits().wrapping_add(127) << 23);
     let value = mantissa * power;
-    if x.is_nan() {
-        x
-    } else if x < -87.0 {
-        0.0
-    } else {
-        value
-    }
+    if x < -87.0 { 0.0 } else { value }
 }
 
 /// `mish(x)` for finite `x`; NaN stays NaN.
 #[inline(always)]
 pub fn mish(x: f32) -> f32 {
-    let e = exp(if x < 20.0 { x } else { 20.0 });
+    let e = exp_below(if x < 20.0 { x } else { 20.0 });
     let n = e * (e + 2.0);
     x * (n / (n + 2.0))
 }
@@ -57,7 +58,7 @@ pub fn mish(x: f32) -> f32 {
 /// `n / (n + 2) + 4 x e (e + 1) / (n + 2)^2`, from one exponential.
 #[inline(always)]
 pub fn mish_with_derivative(x: f32) -> (f32, f32) {
-    let e = exp(if x < 20.0 { x } else { 20.0 });
+    let e = exp_below(if x < 20.0 { x } else { 20.0 });
     let n = e * (e + 2.0);
     let inverse = 1.0 / (n + 2.0);
     // `n / (n + 2)`, not `n * inverse`: the value has the bits of `mish`.

@@ -47,7 +47,7 @@ impl Layout {
     /// The byte that a weight of a row is stored as, and the other way round.
     pub const fn byte(self, row: usize, weight: i8) -> i8 {
         match self {
-            Self::Paired if row % 2 == 0 => weight ^ i8::MIN,
+            Self::Paired if row.is_multiple_of(2) => weight ^ i8::MIN,
             Self::Rows | Self::Paired => weight,
         }
     }

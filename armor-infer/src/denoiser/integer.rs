@@ -17,7 +17,7 @@ use crate::policy::Policy;
 /// The working memory of an integer denoiser.
 pub(crate) struct IntegerDenoiser<const STATE: usize, const HIDDEN: usize> {
     /// The codes of the state `[S]`.
-    state: [i16; STATE],
+    state: OnWords<[i16; STATE]>,
     /// The two layers of the kappa embedding that are in use `[K]`, `[E]`.
     embedding: [[f32; HIDDEN]; 2],
     /// What layer 1 has of bias, state and budget, pre-activations `[H]`.
@@ -25,17 +25,21 @@ pub(crate) struct IntegerDenoiser<const STATE: usize, const HIDDEN: usize> {
     /// Sums and pre-activations of a layer `[H]`.
     sums: [i32; HIDDEN],
     /// Codes of a layer's activations `[H]`.
-    codes: [i16; HIDDEN],
+    codes: OnWords<[i16; HIDDEN]>,
 }
+
+/// Numbers that start on a word, for machines that load two codes at a time.
+#[repr(align(4))]
+struct OnWords<T>(T);
 
 impl<const STATE: usize, const HIDDEN: usize> IntegerDenoiser<STATE, HIDDEN> {
     pub(super) const fn new() -> Self {
         Self {
-            state: [0; STATE],
+            state: OnWords([0; STATE]),
             embedding: [[0.0; HIDDEN]; 2],
             context: [0; HIDDEN],
             sums: [0; HIDDEN],
-            codes: [0; HIDDEN],
+            codes: OnWords([0; HIDDEN]),
         }
     }
 
@@ -51,14 +55,14 @@ impl<const STATE: usize, const HIDDEN: usize> IntegerDenoiser<STATE, HIDDEN> {
             *out = *bias;
         }
 
-        let codes = front(&mut self.state, policy.shape.state.into());
+        let codes = front(&mut self.state.0, policy.shape.state.into());
         let unit = encode(normalised(policy, state), network.state_unit, codes)?;
         let (kernel, layout) = (policy.kernel, network.layout);
         add_rows((kernel, layout), &network.context_state, codes, unit, &mut self.sums, context);
 
         let [first, second] = &mut self.embedding;
         let embedding = kappa_embedding(policy, kappa, first, second);
-        let codes = front(&mut self.codes, embedding.len());
+        let codes = front(&mut self.codes.0, embedding.len());
         let unit = encode(embedding.iter().copied(), network.kappa_unit, codes)?;
         add_rows((kernel, layout), &network.context_kappa, codes, unit, &mut self.sums, context);
         Ok(())
@@ -77,7 +81,7 @@ impl<const STATE: usize, const HIDDEN: usize> IntegerDenoiser<STATE, HIDDEN> {
         let LevelScales { activate, rescale, last_scale } = level;
         let (kernel, layout, h) = (policy.kernel, network.layout, usize::from(policy.shape.hidden));
         let sums = front(&mut self.sums, h);
-        let codes = front(&mut self.codes, h);
+        let codes = front(&mut self.codes.0, h);
 
         let time = network.time_table.get((n - 1) * h..).unwrap_or_default();
         for ((out, time), context) in sums.iter_mut().zip(time).zip(&self.context) {

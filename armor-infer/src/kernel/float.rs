@@ -8,6 +8,13 @@ const NARROW: usize = 8;
 pub(super) fn accumulate<const WIDE: usize>(weights: &[f32], x: &[f32], out: &mut [f32]) {
     let stride = out.len().max(1);
     let (weights, out) = blocks::<WIDE>(weights, stride, x, out);
+    accumulate_rest(weights, stride, x, out);
+}
+
+/// [`accumulate`] of the last outputs of a matrix that has `stride` of them;
+/// `weights` starts at their first column.
+#[inline(always)]
+pub(super) fn accumulate_rest(weights: &[f32], stride: usize, x: &[f32], out: &mut [f32]) {
     let (weights, out) = blocks::<NARROW>(weights, stride, x, out);
     // The output layer is a few sums over many inputs: its time is the latency
     // of one sum, so all that is left is summed in a single pass.

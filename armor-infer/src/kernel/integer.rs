@@ -14,21 +14,21 @@ pub(super) fn sum_rows(weights: &[i8], codes: &[i16], sums: &mut [i32]) {
 pub(super) fn sum_pairs(weights: &[i8], codes: &[i16], sums: &mut [i32]) {
     let group = Layout::Paired.bytes(Layout::BLOCK, codes.len()).max(1);
     for (sums, group) in sums.chunks_mut(Layout::BLOCK).zip(weights.chunks_exact(group)) {
-        let mut totals = [[0; 2]; Layout::BLOCK / 2];
-        for (codes, block) in
-            codes.chunks(Layout::BLOCK).zip(group.as_chunks::<{ 2 * Layout::BLOCK }>().0.as_chunks().0)
-        {
+        let mut totals = [0; Layout::BLOCK];
+        for (codes, block) in codes.chunks(Layout::BLOCK).zip(group.as_chunks().0) {
             add_block(block, codes, &mut totals);
         }
-        for (sum, total) in sums.iter_mut().zip(totals.as_flattened()) {
-            *sum = *total;
+        for (sum, total) in sums.iter_mut().zip(totals) {
+            *sum = total;
         }
     }
 }
 
-/// Adds a block's products to the sums of its two pairs of rows.
-pub(super) fn add_block(block: &[[i8; 2 * Layout::BLOCK]; 2], codes: &[i16], totals: &mut [[i32; 2]; 2]) {
-    for (pair, [low, high]) in block.iter().zip(totals) {
+/// Adds the products of a block of [`Layout::Paired`] to the sums of its rows.
+#[inline(always)]
+pub(super) fn add_block(block: &[i8; Layout::BLOCK * Layout::BLOCK], codes: &[i16], sums: &mut [i32; Layout::BLOCK]) {
+    let (pairs, _) = block.as_chunks::<{ 2 * Layout::BLOCK }>();
+    for (pair, [low, high]) in pairs.iter().zip(sums.as_chunks_mut().0) {
         for ([low_byte, high_byte], code) in pair.as_chunks().0.iter().zip(codes) {
             let code = i32::from(*code);
             *low += code * i32::from(Layout::Paired.byte(0, *low_byte));

@@ -7,11 +7,16 @@
 
 #[cfg(all(feature = "std", target_arch = "x86_64"))]
 mod avx2;
+mod check;
+#[cfg(all(feature = "dsp", target_arch = "arm"))]
+mod cortex_m;
 mod float;
 mod integer;
 #[cfg(test)]
 mod tests;
 
+#[cfg(all(feature = "cortex-m55", target_arch = "arm"))]
+use armor_core::fixed::SHORT_BITS;
 use armor_core::image::Layout;
 
 /// The instructions that a policy's arithmetic runs on.
@@ -22,6 +27,9 @@ pub enum Kernel {
     /// 256-bit vectors, on x86-64 with the feature `std`.
     #[cfg(all(feature = "std", target_arch = "x86_64"))]
     Avx2(avx2::Avx2),
+    /// 16-bit SIMD and the FPU of a Cortex-M4, M7, M33 or M55.
+    #[cfg(all(feature = "dsp", target_arch = "arm"))]
+    CortexM,
 }
 
 /// Outputs whose single-precision sums portable code keeps in registers: eight
@@ -37,7 +45,9 @@ impl Kernel {
     pub fn available() -> impl Iterator<Item = Self> {
         #[cfg(all(feature = "std", target_arch = "x86_64"))]
         let more = avx2::Avx2::detect().map(Self::Avx2);
-        #[cfg(not(all(feature = "std", target_arch = "x86_64")))]
+        #[cfg(all(feature = "dsp", target_arch = "arm"))]
+        let more = Some(Self::CortexM);
+        #[cfg(not(any(all(feature = "std", target_arch = "x86_64"), all(feature = "dsp", target_arch = "arm"))))]
         let more = None;
         core::iter::once(Self::Portable).chain(more)
     }
@@ -53,6 +63,8 @@ impl Kernel {
             Self::Portable => "portable",
             #[cfg(all(feature = "std", target_arch = "x86_64"))]
             Self::Avx2(_) => "avx2",
+            #[cfg(all(feature = "dsp", target_arch = "arm"))]
+            Self::CortexM => "cortex-m",
         }
     }
 
@@ -72,6 +84,10 @@ impl Kernel {
             Self::Portable => float::accumulate::<WIDE>(weights, x, out),
             #[cfg(all(feature = "std", target_arch = "x86_64"))]
             Self::Avx2(kernel) => kernel.accumulate(weights, x, out),
+            #[cfg(all(feature = "dsp", target_arch = "arm", target_abi = "eabihf"))]
+            Self::CortexM => cortex_m::accumulate(weights, x, out),
+            #[cfg(all(feature = "dsp", target_arch = "arm", not(target_abi = "eabihf")))]
+            Self::CortexM => float::accumulate::<WIDE>(weights, x, out),
         }
     }
 
@@ -81,6 +97,8 @@ impl Kernel {
             Self::Portable => float::mish(values),
             #[cfg(all(feature = "std", target_arch = "x86_64"))]
             Self::Avx2(kernel) => kernel.mish(values),
+            #[cfg(all(feature = "dsp", target_arch = "arm"))]
+            Self::CortexM => float::mish(values),
         }
     }
 
@@ -91,11 +109,18 @@ impl Kernel {
     /// keep their sum.
     ///
     /// [`fixed::MAX_TERMS`]: armor_core::fixed::MAX_TERMS
-    #[cfg_attr(not(all(feature = "std", target_arch = "x86_64")), expect(unused_variables))]
+    #[cfg_attr(
+        not(any(all(feature = "std", target_arch = "x86_64"), all(feature = "dsp", target_arch = "arm"))),
+        expect(unused_variables)
+    )]
     pub(crate) fn sum_rows(self, layout: Layout, weights: &[i8], codes: &[i16], bits: u32, sums: &mut [i32]) {
         match self {
             #[cfg(all(feature = "std", target_arch = "x86_64"))]
             Self::Avx2(kernel) if layout == Layout::Rows => kernel.sum_rows(weights, codes, bits, sums),
+            #[cfg(all(feature = "dsp", target_arch = "arm"))]
+            Self::CortexM if layout == Layout::Paired => cortex_m::sum_pairs(weights, codes, bits, sums),
+            #[cfg(all(feature = "cortex-m55", target_arch = "arm"))]
+            Self::CortexM if bits == SHORT_BITS => cortex_m::sum_rows_short(weights, codes, sums),
             _ => match layout {
                 Layout::Rows => integer::sum_rows(weights, codes, sums),
                 Layout::Paired => integer::sum_pairs(weights, codes, sums),
@@ -110,6 +135,8 @@ impl Kernel {
             Self::Portable => integer::rescale(sums, bits, multiplier, factor, bias),
             #[cfg(all(feature = "std", target_arch = "x86_64"))]
             Self::Avx2(kernel) => kernel.rescale(sums, bits, multiplier, factor, bias),
+            #[cfg(all(feature = "dsp", target_arch = "arm"))]
+            Self::CortexM => cortex_m::rescale(sums, bits, multiplier, factor, bias),
         }
     }
 
@@ -119,6 +146,8 @@ impl Kernel {
             Self::Portable => integer::activate(pre, factor, bits, codes),
             #[cfg(all(feature = "std", target_arch = "x86_64"))]
             Self::Avx2(kernel) => kernel.activate(pre, factor, bits, codes),
+            #[cfg(all(feature = "dsp", target_arch = "arm"))]
+            Self::CortexM => cortex_m::activate(pre, factor, bits, codes),
         }
     }
 }
