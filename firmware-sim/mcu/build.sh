@@ -49,6 +49,8 @@ build() {
     # The core's own instructions go to our crates alone, so that boards of one
     # target share its `core`.
     core="'-Ctarget-cpu=$cpu'"
+    # Its vectors of floats flush subnormal numbers to zero (docs/numerics.md); those of integers stay.
+    [[ $cpu != cortex-m55 ]] || core+=", '-Ctarget-feature=-mve.fp'"
     link="'-Clink-arg=-L$PWD/boards/$map', '-Clink-arg=-Tlink.x'"
     flags=(
         -Zprofile-rustflags
