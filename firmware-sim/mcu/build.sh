@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
-# Builds the bare-metal firmware for the named boards, or for all of them, into
-# target/mcu/BOARD.elf. Needs Debian's rustc-web and rust-web-src, whose library
+# Builds the bare-metal firmware for the named boards into target/mcu/BOARD.elf;
+# `c` is the firmware in C for mps2-an386, and `all` is all of them. Needs Debian's rustc-web and rust-web-src, whose library
 # source builds `core` for any target, and a linker: rustup's rust-lld or lld.
 #
-#     firmware-sim/mcu/build.sh [BOARD...]
+#     firmware-sim/mcu/build.sh [BOARD...|c|all]
 set -euo pipefail
 cd "$(dirname "$0")"
 
@@ -31,42 +31,72 @@ fi
 export RUSTC=$COMPILER RUSTC_BOOTSTRAP=1 CARGO_TARGET_DIR=$OUT
 unset RUSTFLAGS CARGO_ENCODED_RUSTFLAGS CARGO_BUILD_RUSTFLAGS
 
-build() {
-    local board=$1 feature=$1 map target cpu core link flags variable
-    case $board in
+# Sets `target`, `cpu` and `map` for a board.
+describe() {
+    case $1 in
         mps2-an385) target=thumbv6m-none-eabi cpu=cortex-m0 map=mps2 ;;
         mps2-an386) target=thumbv7em-none-eabihf cpu=cortex-m4 map=mps2 ;;
         mps2-an500) target=thumbv7em-none-eabihf cpu=cortex-m7 map=mps2 ;;
         mps2-an505) target=thumbv8m.main-none-eabihf cpu=cortex-m33 map=an505 ;;
         mps3-an547) target=thumbv8m.main-none-eabihf cpu=cortex-m55 map=an547 ;;
-        rv32imac) target=riscv32imac-unknown-none-elf cpu=generic-rv32 map=virt feature=virt ;;
-        rv32imafc) target=riscv32imafc-unknown-none-elf cpu=generic-rv32 map=virt feature=virt ;;
+        rv32imac) target=riscv32imac-unknown-none-elf cpu=generic-rv32 map=virt ;;
+        rv32imafc) target=riscv32imafc-unknown-none-elf cpu=generic-rv32 map=virt ;;
         *)
-            echo "error: no board $board; choose from ${ALL[*]}" >&2
+            echo "error: no board $1; choose from ${ALL[*]} c" >&2
             exit 2
             ;;
     esac
-    # The core's own instructions go to our crates alone, so that boards of one
-    # target share its `core`.
-    core="'-Ctarget-cpu=$cpu'"
-    # Its vectors of floats flush subnormal numbers to zero (docs/numerics.md); those of integers stay.
-    [[ $cpu != cortex-m55 ]] || core+=", '-Ctarget-feature=-mve.fp'"
-    link="'-Clink-arg=-L$PWD/boards/$map', '-Clink-arg=-Tlink.x'"
-    flags=(
-        -Zprofile-rustflags
-        --config "profile.release.package.armor-core.rustflags=[$core]"
-        --config "profile.release.package.armor-infer.rustflags=[$core]"
-        --config "profile.release.package.armor-mcu.rustflags=[$core, $link]"
-    )
-    variable=${target^^}
-    variable=CARGO_TARGET_${variable//[-.]/_}_LINKER
-    env "$variable=$linker" cargo build --quiet --locked --release -Zbuild-std=core --target "$target" \
-        --features "$feature" "${flags[@]}"
-    cp "$OUT/$target/release/armor-mcu" "$OUT/$board.elf.part"
-    mv "$OUT/$board.elf.part" "$OUT/$board.elf"
 }
 
-for board in "${@:-${ALL[@]}}"; do
-    build "$board"
+# Builds a package; the core's own instructions go to our crates alone, so that
+# boards of one target share its `core`.
+package() {
+    local package=$1 core="'-Ctarget-cpu=$cpu'"
+    # Its vectors of floats flush subnormal numbers to zero (docs/numerics.md); those of integers stay.
+    [[ $cpu != cortex-m55 ]] || core+=", '-Ctarget-feature=-mve.fp'"
+    local link="'-Clink-arg=-L$PWD/boards/$map', '-Clink-arg=-Tlink.x'"
+    local variable=${target^^}
+    shift
+    env "CARGO_TARGET_${variable//[-.]/_}_LINKER=$linker" \
+        cargo build --quiet --locked --release -Zbuild-std=core -Zprofile-rustflags --target "$target" \
+        --config "profile.release.package.armor-core.rustflags=[$core]" \
+        --config "profile.release.package.armor-infer.rustflags=[$core]" \
+        --config "profile.release.package.armor-mcu-c.rustflags=[$core]" \
+        --config "profile.release.package.armor-mcu.rustflags=[$core, $link]" \
+        --package "$package" "$@"
+}
+
+rust_firmware() {
+    local feature=$1
+    [[ $map == virt ]] && feature=virt
+    package armor-mcu --features "$feature"
+    cp "$OUT/$target/release/armor-mcu" "$OUT/$1.elf.part"
+    mv "$OUT/$1.elf.part" "$OUT/$1.elf"
+}
+
+c_firmware() {
+    command -v arm-none-eabi-gcc >/dev/null || {
+        echo "error: the firmware in C needs apt-get install gcc-arm-none-eabi libnewlib-arm-none-eabi" >&2
+        exit 1
+    }
+    package armor-mcu-c --features cortex-m4
+    local example=../../armor-infer/examples/c
+    arm-none-eabi-gcc -std=c11 -O2 -Wall -Wextra -Wpedantic -Werror -ffp-contract=off -ffunction-sections \
+        -mcpu=cortex-m4 -mthumb -mfloat-abi=hard -mfpu=fpv4-sp-d16 --specs=nano.specs --specs=nosys.specs \
+        -I../../armor-infer/include -I$example -Ic c/main.c c/board.c $example/ball_run.c \
+        "$OUT/$target/release/libarmor.a" -nostartfiles -Wl,--gc-sections -Lboards/$map -Tc/link.ld -lm \
+        -o "$OUT/c.elf.part"
+    mv "$OUT/c.elf.part" "$OUT/c.elf"
+}
+
+[[ ${1-all} == all ]] && set -- "${ALL[@]}" c
+for board; do
+    if [[ $board == c ]]; then
+        describe mps2-an386
+        c_firmware
+    else
+        describe "$board"
+        rust_firmware "$board"
+    fi
     echo "firmware $board: built"
 done

@@ -5,6 +5,10 @@
 #[expect(dead_code, reason = "other tests use the rest")]
 mod fixture;
 
+use std::fs;
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+use std::process::{Command, Stdio};
 use std::time::Duration;
 
 use armor_core::image::PolicyImage;
@@ -103,4 +107,46 @@ fn a_budget_that_is_spent_stays_at_zero() {
         assert_eq!(episode.kappas().last().map(|kappa| kappa.to_f32()), Some(0.0));
         assert!(episode.kappas().collect::<Vec<_>>().is_sorted_by(|before, after| before >= after));
     }
+}
+
+/// An episode of the point robot in MuJoCo, flown by a controller of another
+/// process: what the plant prints of it, and its recording.
+fn recorded_with(controller: &[&str], folder: &Path) -> (Vec<u8>, Vec<u8>) {
+    let mut controller = Command::new(env!("CARGO_BIN_EXE_firmware-sim"))
+        .current_dir(folder)
+        .args(controller)
+        .args(["--listen", "127.0.0.1:0"])
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut said = BufReader::new(controller.stderr.take().unwrap()).lines().map_while(Result::ok);
+    let address = said.find_map(|line| line.strip_prefix("listening at ").map(str::to_owned)).unwrap();
+    let environment = Environment::open(&Environment::folder().unwrap(), |note| eprintln!("{note}")).unwrap();
+    let flown = Command::new(environment.python())
+        .env("PYTHONPATH", concat!(env!("CARGO_MANIFEST_DIR"), "/python/src"))
+        .current_dir(folder)
+        .args(["-m", "armor_plant", "SafetyPointCircle1-v0", "--connect", &address, "--each", "--episodes", "1"])
+        .args(["--seed", "7", "--record", "flown.hdf5"])
+        .output();
+    // `serve` waits for other plants.
+    let _ = controller.kill();
+    controller.wait().unwrap();
+    let flown = flown.unwrap();
+    assert!(flown.status.success(), "{}", String::from_utf8_lossy(&flown.stderr));
+    (flown.stdout, fs::read(folder.join("flown.hdf5")).unwrap())
+}
+
+/// Hardware in the loop: 500 steps of MuJoCo, where an action that differs in a
+/// bit would end in another place.
+#[test]
+#[ignore = "needs the simulators and QEMU: tests/mcu.sh"]
+fn emulated_cortex_m4_flies_mujoco_as_this_host_does() {
+    let task = Task::named("SafetyPointCircle1-v0").unwrap();
+    let shape = Shape { state: task.state as u16, action: task.action as u16, ..BALL_RUN };
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("policy.armor"), Parts::random(task.name, shape, 1).with_golden().bytes()).unwrap();
+    let host = recorded_with(&["serve", "policy.armor"], folder.path());
+    let machine = recorded_with(&["mcu", "policy.armor", "--machine", "mps2-an386"], folder.path());
+    assert!(String::from_utf8_lossy(&host.0).contains("\"episode\": 0"));
+    assert!(host == machine, "the emulated controller flew otherwise than the host's");
 }

@@ -43,7 +43,10 @@ pub const ARMOR_IMAGE_ALIGN: usize = 16;
 
 /// A controller in the caller's memory. It reads its image in place for as long
 /// as it is used, and has nothing to be released.
-pub struct ArmorController(Controller<'static, ARMOR_STATE_MAX, ARMOR_ACTION_MAX, ARMOR_HIDDEN_MAX>);
+#[repr(transparent)]
+pub struct ArmorController(Inner);
+
+type Inner = Controller<'static, ARMOR_STATE_MAX, ARMOR_ACTION_MAX, ARMOR_HIDDEN_MAX>;
 
 const _: () = assert!(
     size_of::<ArmorController>() <= ARMOR_CONTROLLER_SIZE
@@ -155,8 +158,7 @@ pub unsafe extern "C" fn armor_golden_replay(
         let (memory, image) = unsafe { (pointer::room(memory, memory_len)?, checked(image, image_len)?) };
         let trace = &image.sections().golden;
         let limit = CostLimit::from_cost(trace.limit);
-        let controller = memory.write(ArmorController(Controller::new(Policy::load(&image)?, limit, trace.seed)?));
-        golden::replay_on(&mut controller.0, trace)?;
+        golden::replay_on(Controller::new_in(memory, Policy::load(&image)?, limit, trace.seed)?, trace)?;
         Ok(())
     })
 }
@@ -184,8 +186,8 @@ pub unsafe extern "C" fn armor_controller_init(
         let out = unsafe { pointer::place(out)? }.write(core::ptr::null_mut());
         // SAFETY: as above.
         let (memory, image) = unsafe { (pointer::room(memory, memory_len)?, checked(image, image_len)?) };
-        let controller = Controller::new(Policy::load(&image)?, CostLimit::new(cost_limit)?, seed)?;
-        *out = memory.write(ArmorController(controller));
+        let controller = Controller::new_in(memory, Policy::load(&image)?, CostLimit::new(cost_limit)?, seed)?;
+        *out = core::ptr::from_mut(controller).cast();
         Ok(())
     })
 }

@@ -3,7 +3,7 @@
 use core::ffi::c_void;
 use core::mem::MaybeUninit;
 
-use super::{ARMOR_CONTROLLER_ALIGN, ARMOR_CONTROLLER_SIZE, ArmorController, ArmorStatus};
+use super::{ARMOR_CONTROLLER_ALIGN, ARMOR_CONTROLLER_SIZE, ArmorStatus, Inner};
 
 /// Whether a pointer may be followed.
 fn check<T>(pointer: *const T, align: usize) -> Result<(), ArmorStatus> {
@@ -30,10 +30,7 @@ pub(super) unsafe fn place<'a, T>(pointer: *mut T) -> Result<&'a mut MaybeUninit
 ///
 /// # Safety
 /// As of [`place`], for `length` bytes.
-pub(super) unsafe fn room<'a>(
-    memory: *mut c_void,
-    length: usize,
-) -> Result<&'a mut MaybeUninit<ArmorController>, ArmorStatus> {
+pub(super) unsafe fn room<'a>(memory: *mut c_void, length: usize) -> Result<&'a mut MaybeUninit<Inner>, ArmorStatus> {
     check(memory, ARMOR_CONTROLLER_ALIGN)?;
     if length < ARMOR_CONTROLLER_SIZE {
         return Err(ArmorStatus::MemoryTooSmall);

@@ -87,8 +87,9 @@ impl<'a, const STATE: usize, const ACTION: usize, const HIDDEN: usize> Endpoint<
     /// The answer to a received frame, which is overwritten; none where there
     /// is nothing to say, because the frame was damaged or late.
     pub fn receive(&mut self, frame: &mut [u8]) -> Option<Answer<'a, ACTION>> {
-        match decode(frame) {
-            Ok(request) => self.answer(&request),
+        // By reference: a request that is moved is on the stack twice.
+        match &decode(frame) {
+            Ok(request) => self.answer(request),
             Err(FrameError::Malformed) => Some(Answer::Refused(Refusal::Malformed)),
             Err(FrameError::Damaged | FrameError::Full) => None,
         }

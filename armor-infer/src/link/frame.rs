@@ -92,8 +92,12 @@ impl From<Full> for postcard::Error {
 /// Reads the message of a frame, with or without the zero at its end; the
 /// frame is overwritten by its content.
 ///
+/// Not inlined, so that its part of a small stack is free again before the
+/// message is answered.
+///
 /// # Errors
 /// [`FrameError::Damaged`], [`FrameError::Malformed`]
+#[inline(never)]
 pub fn decode<'f, T: Deserialize<'f>>(frame: &'f mut [u8]) -> Result<T, FrameError> {
     let length = unstuff(frame).ok_or(FrameError::Damaged)?;
     let content = frame.get(..length).ok_or(FrameError::Damaged)?;

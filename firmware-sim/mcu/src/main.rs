@@ -29,7 +29,7 @@ mod uart;
 use core::ffi::CStr;
 use core::mem::MaybeUninit;
 
-use armor_core::image::{ImageError, PolicyImage};
+use armor_core::image::PolicyImage;
 use armor_infer::link::Endpoint;
 use semihosting::process::exit;
 
@@ -85,18 +85,26 @@ fn run() -> Result<(), Stop> {
     }
 }
 
-/// The image in its slot, checked, in memory of its own.
+/// Where the controller lies.
+static mut ENDPOINT: MaybeUninit<McuEndpoint> = MaybeUninit::uninit();
+
+/// The image in its slot, checked. The check takes more stack than any flight,
+/// and so it has the memory of the controller for its stack, which is not there yet.
 fn image() -> Result<&'static PolicyImage<'static>, Stop> {
-    static mut IMAGE: MaybeUninit<Result<PolicyImage<'static>, ImageError>> = MaybeUninit::uninit();
-    // SAFETY: `run` calls this once, and there is one thread.
-    let place = unsafe { &mut *(&raw mut IMAGE) };
-    place.write(PolicyImage::new_checked(memory::policy_slot())).as_ref().map_err(|_| c"failed image")
+    static mut IMAGE: Option<PolicyImage<'static>> = None;
+    extern "C" fn check() {
+        // SAFETY: `image` is called once, and there is one thread.
+        unsafe { IMAGE = PolicyImage::new_checked(memory::policy_slot()).ok() }
+    }
+    // SAFETY: nothing else uses this memory before `endpoint` is called.
+    unsafe { memory::call_on((&raw mut ENDPOINT).add(1).cast(), check) }
+    // SAFETY: as of `check`, which has ended.
+    unsafe { (*(&raw const IMAGE)).as_ref() }.ok_or(c"failed image")
 }
 
-/// The controller behind its link, in memory of its own.
+/// The controller behind its link.
 fn endpoint(image: &PolicyImage<'static>, steps: usize) -> Result<&'static mut McuEndpoint, Stop> {
-    static mut ENDPOINT: MaybeUninit<McuEndpoint> = MaybeUninit::uninit();
-    // SAFETY: `run` calls this once, and there is one thread.
+    // SAFETY: `run` calls this once, after `image`, and there is one thread.
     let place = unsafe { &mut *(&raw mut ENDPOINT) };
     Endpoint::new_in(place, image, steps).map_err(|_| c"failed policy")
 }

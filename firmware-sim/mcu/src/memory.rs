@@ -32,3 +32,36 @@ pub(crate) fn stack_high_water() -> u32 {
     }
     (highest.addr() - place.addr()) as u32
 }
+
+/// Calls a function on another stack, which grows down from `top`.
+///
+/// # Safety
+/// The memory below `top` is nobody else's meanwhile, and is enough.
+pub(crate) unsafe fn call_on(top: *mut u8, function: extern "C" fn()) {
+    // SAFETY: the caller's word; both procedure call standards want 16 bytes at most.
+    unsafe { switch(top.map_addr(|address| address & !15), function) }
+}
+
+#[cfg(feature = "cortex-m")]
+#[unsafe(naked)]
+unsafe extern "C" fn switch(top: *mut u8, function: extern "C" fn()) {
+    core::arch::naked_asm!("push {{r4, lr}}", "mov r4, sp", "mov sp, r0", "blx r1", "mov sp, r4", "pop {{r4, pc}}")
+}
+
+#[cfg(feature = "virt")]
+#[unsafe(naked)]
+unsafe extern "C" fn switch(top: *mut u8, function: extern "C" fn()) {
+    core::arch::naked_asm!(
+        "addi sp, sp, -16",
+        "sw ra, 12(sp)",
+        "sw s0, 8(sp)",
+        "mv s0, sp",
+        "mv sp, a0",
+        "jalr a1",
+        "mv sp, s0",
+        "lw s0, 8(sp)",
+        "lw ra, 12(sp)",
+        "addi sp, sp, 16",
+        "ret",
+    )
+}

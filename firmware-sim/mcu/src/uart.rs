@@ -75,8 +75,8 @@ mod registers {
 pub(crate) struct Uart(());
 
 impl Uart {
-    /// Looks at the line before it is idle: minutes of an emulator's time.
-    const PATIENCE: u32 = u32::MAX;
+    /// Looks at the line before it is idle: about a minute of an emulator's time.
+    const PATIENCE: u32 = 1 << 28;
 
     pub(crate) fn new() -> Self {
         registers::enable();

@@ -1,14 +1,16 @@
 //! `firmware-sim mcu`
 
 use std::fmt;
+use std::net::TcpListener;
 use std::path::PathBuf;
 use std::time::Duration;
 
 use serde::Serialize;
 
 use super::output::{CommandResult, Output};
+use crate::host;
 use crate::image_file::ImageFile;
-use crate::mcu::{Firmware, MACHINES, Machine, Survey, SurveyPlan, survey};
+use crate::mcu::{Firmware, Flashed, MACHINES, Machine, Survey, SurveyPlan, bridge, survey};
 
 /// Fly a policy on emulated microcontrollers: bit equality with this host over
 /// golden trace and episode, instructions of an action, flash, RAM, stack.
@@ -22,6 +24,10 @@ pub(super) struct Mcu {
     /// The emulated board, or `all` of them.
     #[arg(long, value_name = "M", value_parser = machines)]
     machine: Machines,
+    /// Instead, wait for a plant at this address, as in 127.0.0.1:4750, and
+    /// give it the machine's UART until it leaves.
+    #[arg(long, value_name = "HOST:PORT", conflicts_with_all = ["actions", "seed"])]
+    listen: Option<String>,
     /// A folder with built firmware, MACHINE.elf, in place of building it.
     #[arg(long, value_name = "DIR")]
     firmware: Option<PathBuf>,
@@ -62,18 +68,42 @@ impl Mcu {
         let file = ImageFile::read(&self.image)?;
         file.image()?;
         let (max_steps, actions, seed) = (self.max_steps, self.actions, self.seed);
-        let plan = SurveyPlan { max_steps, actions, seed, patience: Duration::from_secs(self.patience) };
-        let mut report = Report { image: self.image, machines: Vec::new() };
-        for machine in self.machine.0 {
+        let patience = Duration::from_secs(self.patience);
+        let plan = SurveyPlan { max_steps, actions, seed, patience };
+        if self.listen.is_some() && self.machine.0.len() != 1 {
+            return Err("--listen puts one machine behind the link; name it".into());
+        }
+        let mut report = Report { image: self.image.clone(), machines: Vec::new() };
+        for &machine in &self.machine.0 {
             output.note(format_args!("{}: firmware", machine.name));
             let firmware = match &self.firmware {
                 None => Firmware::build(machine)?,
                 Some(folder) => Firmware::read(&folder.join(format!("{}.elf", machine.name)))?,
             };
+            if let Some(address) = &self.listen {
+                return self.serve((machine, &firmware), &file, address, output);
+            }
             output.note(format_args!("{}: flying and counting", machine.name));
             report.machines.push(survey(machine, &firmware, file.bytes(), &plan)?);
         }
         output.report(&report)
+    }
+
+    /// Hardware in the loop: who connects first has the machine's UART.
+    fn serve(
+        &self,
+        (machine, firmware): (&'static Machine, &Firmware),
+        file: &ImageFile,
+        address: &str,
+        output: Output,
+    ) -> CommandResult {
+        let image = host::check(file.bytes()).map_err(|error| format!("{}: {error}", self.image.display()))?.image;
+        let flashed = Flashed::new(machine, firmware, image.bytes())?;
+        let listener = TcpListener::bind(address).map_err(|error| format!("cannot listen at {address}: {error}"))?;
+        output.note(format_args!("listening at {}", listener.local_addr()?));
+        bridge(&flashed, u32::try_from(self.max_steps).unwrap_or(u32::MAX), &listener)?;
+        output.note("the plant left");
+        Ok(())
     }
 }
 

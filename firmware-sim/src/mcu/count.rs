@@ -102,3 +102,16 @@ fn parse(text: &str) -> Result<Counts, McuError> {
     let bad = |bad: &str| McuError::Count { what: format!("no count: {bad}") };
     text.lines().map(|text| line(text).ok_or_else(|| bad(text))).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_count_is_read_and_what_is_none_is_named() {
+        let counts = parse("45028 125190 4 bne.w #0xae9e\n44988 7 4 vadd.f32 s2, s2, s18\n12 1 2 ").unwrap();
+        let expected = [(12, 1, Class::Vector), (44988, 7, Class::Float), (45028, 125_190, Class::Branch)];
+        assert!(counts.iter().map(|(&at, it)| (at, it.executions, it.class)).eq(expected));
+        assert!(parse("45028 many 4 bne.w").unwrap_err().to_string().contains("45028 many"));
+    }
+}

@@ -108,15 +108,30 @@ pub struct Running {
 }
 
 impl Running {
-    /// Waits for its end.
+    /// Waits for its end; what it told.
+    ///
+    /// # Errors
+    /// As of [`Running::console`].
+    pub fn wait(self, patience: Duration) -> Result<Told, McuError> {
+        let machine = self.machine.name;
+        let console = self.console(patience)?;
+        let told = console.lines().map(|line| {
+            let (word, number) = line.split_once(' ')?;
+            Some((word.to_owned(), number.parse().ok()?))
+        });
+        let why = || "it told what is no line of a word and a number".into();
+        told.collect::<Option<_>>().map(Told).ok_or_else(|| McuError::Failed { machine, why: why() })
+    }
+
+    /// Waits for its end; all that it printed.
     ///
     /// # Errors
     /// [`McuError`], where it does not end in time, or not as it should.
-    pub fn wait(mut self, patience: Duration) -> Result<Told, McuError> {
+    pub fn console(mut self, patience: Duration) -> Result<String, McuError> {
         let started = Instant::now();
         loop {
             if let Some(status) = self.ended()? {
-                return self.told(status);
+                return self.printed(status);
             }
             if started.elapsed() > patience {
                 return Err(McuError::Late { machine: self.machine.name, patience });
@@ -130,7 +145,7 @@ impl Running {
         self.child.try_wait().map_err(McuError::system("wait for", Path::new(self.machine.emulator)))
     }
 
-    fn told(&self, status: ExitStatus) -> Result<Told, McuError> {
+    fn printed(&self, status: ExitStatus) -> Result<String, McuError> {
         // An emulator that could not start wrote no console.
         let console = fs::read_to_string(&self.console).unwrap_or_default();
         let failed = |why: &str| McuError::Failed { machine: self.machine.name, why: why.into() };
@@ -141,11 +156,7 @@ impl Running {
             let complaints = fs::read_to_string(&self.complaints).unwrap_or_default();
             return Err(failed(complaints.lines().last().unwrap_or("nothing")));
         }
-        let told = console.lines().map(|line| {
-            let (word, number) = line.split_once(' ')?;
-            Some((word.to_owned(), number.parse().ok()?))
-        });
-        told.collect::<Option<_>>().map(Told).ok_or_else(|| failed("what is no line of a word and a number"))
+        Ok(console)
     }
 }
 

@@ -21,7 +21,7 @@ use crate::task::Task;
 /// Time between looks at whether an emulator has connected.
 const GLANCE: Duration = Duration::from_millis(5);
 /// What an emulator has to start and connect.
-const START: Duration = Duration::from_secs(30);
+pub(super) const START: Duration = Duration::from_secs(30);
 
 /// What to fly.
 #[derive(Clone, Copy, Debug)]
@@ -68,7 +68,7 @@ pub fn fly(
 
     let listener = TcpListener::bind("127.0.0.1:0").map_err(line)?;
     let serial = format!("tcp:{}", listener.local_addr().map_err(line)?);
-    let actions = plan.task.horizon;
+    let actions = u32::try_from(plan.task.horizon).unwrap_or(u32::MAX);
     let mut running = flashed.start(&format!("serve {} {actions}", plan.max_steps), &["-serial".into(), serial])?;
     let Some(socket) = connection(&mut running, &listener)? else {
         // It says why it ended, unless it ended as if its work were done.
@@ -98,12 +98,17 @@ pub fn fly(
         episode.reward += outcome.reward;
         episode.cost += outcome.cost;
         incurred = outcome.cost as f32;
+        if outcome.done {
+            break;
+        }
     }
-    Ok((episode, running.wait(plan.patience)?))
+    // After a shorter episode the firmware waits for the rest of it.
+    let told = if episode.actions == actions { running.wait(plan.patience)? } else { Told::default() };
+    Ok((episode, told))
 }
 
 /// Waits until an emulator connects; none where it ends before that.
-fn connection(running: &mut Running, listener: &TcpListener) -> Result<Option<TcpStream>, McuError> {
+pub(super) fn connection(running: &mut Running, listener: &TcpListener) -> Result<Option<TcpStream>, McuError> {
     let failed = McuError::system("listen to", "the emulator's serial line".as_ref());
     let mut accept = || -> std::io::Result<Option<TcpStream>> {
         listener.set_nonblocking(true)?;

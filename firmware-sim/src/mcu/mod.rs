@@ -7,6 +7,7 @@
 //! | `firmware.rs` | a built firmware: its sizes, its functions |
 //! | `emulator.rs` | the firmware started, told what to do, heard, and ended in time |
 //! | `episode.rs` | an episode over its UART, in lockstep with this host's controller |
+//! | `bridge.rs` | its UART as a line for a plant of another program |
 //! | `count.rs`, `class.rs` | instructions of an action, by function and by class |
 //! | `survey.rs` | all of it, for a policy and a machine |
 //!
@@ -15,6 +16,7 @@
 //! Words: a *machine* is an emulated board; the *slot* is the part of its
 //! memory that stands for the flash in which the policy lies.
 
+mod bridge;
 mod class;
 mod count;
 mod emulator;
@@ -24,6 +26,7 @@ mod firmware;
 mod machine;
 mod survey;
 
+pub use bridge::bridge;
 pub use class::Class;
 pub use count::{Instructions, count};
 pub use emulator::{Flashed, Running, Told};

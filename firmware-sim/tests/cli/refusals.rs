@@ -103,3 +103,18 @@ fn a_file_that_cannot_be_written_is_named_and_nothing_is_left_behind() {
     assert!(error.contains("cannot write no/such/folder/flight.csv"), "{error}");
     assert_eq!(fs::read_dir(bench.folder.path()).unwrap().count(), before);
 }
+
+#[test]
+fn a_microcontroller_needs_a_machine_that_there_is_and_firmware_for_it() {
+    let bench = Bench::new();
+    let usage = bench.misuse(&["mcu", "policy.armor", "--machine", "mps2-an521"]);
+    assert!(usage.contains("mps2-an505, mps3-an547"), "{usage}");
+    let fly = ["mcu", "policy.armor", "--machine", "mps2-an386", "--firmware", "."];
+    let error = bench.failure(&fly);
+    assert!(error.contains("cannot read ./mps2-an386.elf"), "{error}");
+    bench.put("mps2-an386.elf", b"no firmware");
+    let error = bench.failure(&fly);
+    assert!(error.contains("no firmware of firmware-sim/mcu") && error.contains("build.sh"), "{error}");
+    let error = bench.failure(&["mcu", "policy.armor", "--machine", "all", "--listen", "127.0.0.1:0"]);
+    assert!(error.contains("name it"), "{error}");
+}

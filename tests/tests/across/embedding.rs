@@ -37,8 +37,13 @@ fn embedding_in_c_gives_the_bits_of_the_rust_controller() {
     let (fly, path, _run) = program("ARMOR_C", "fly");
     let printed = output(Command::new(fly).arg(&path).args([LIMIT.to_string(), SEED.to_string()]));
 
-    let bytes = AlignedBytes::read(&path).unwrap();
-    let image = PolicyImage::new_checked(bytes.as_slice()).unwrap();
+    assert_flown_as_here(&printed, AlignedBytes::read(&path).unwrap().as_slice());
+}
+
+/// Whether what a C program printed of an episode with an image is what this
+/// host's controller answers to the same states and costs.
+pub(crate) fn assert_flown_as_here(printed: &str, bytes: &[u8]) {
+    let image = PolicyImage::new_checked(bytes).unwrap();
     let limit = CostLimit::new(LIMIT).unwrap();
     let mut controller = Controller::<STATE, 2, 16>::new(Policy::load(&image).unwrap(), limit, SEED).unwrap();
     let (mut steps, mut costly) = (0, 0);

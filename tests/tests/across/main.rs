@@ -7,6 +7,7 @@
 //! | [`chip_faults`] | a damaged chip boots what was flashed to it, or nothing |
 //! | [`integers`] | a policy in integers is the one in single precision, to what 8 bits can say |
 //! | [`embedding`] | in C and in other loops the controller computes the same bits |
+//! | [`mcu`] | on emulated microcontrollers, too |
 //! | [`determinism`] | the same seed gives the same bits, on any number of threads and across any stop |
 //! | [`conformance`] | the method's invariants on recorded data, and where each of the others is tested |
 //!
@@ -20,4 +21,5 @@ mod embedding;
 mod fixture;
 mod image_faults;
 mod integers;
+mod mcu;
 mod whole_line;
