@@ -67,7 +67,10 @@ pub const fn uniform(word: u32) -> f32 {
 fn box_muller(a: u32, b: u32) -> [f32; 2] {
     // 1 - u lies in (0, 1], so the logarithm is finite.
     let radius = libm::sqrtf(-2.0 * libm::logf(1.0 - uniform(a)));
-    let (sin, cos) = libm::sincosf(TAU * uniform(b));
+    // Never above a turn; `min` tells the compiler, which else keeps the code
+    // and the stack that reduce large angles.
+    let angle = f32::from_bits((TAU * uniform(b)).to_bits().min(TAU.to_bits()));
+    let (sin, cos) = libm::sincosf(angle);
     [radius * cos, radius * sin]
 }
 
