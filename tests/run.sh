@@ -28,5 +28,4 @@ fi
 part "workspace" cargo test --workspace --locked --no-fail-fast
 part "embedding" tests/embedding.sh
 part "link" tests/link.sh
-part "microcontrollers" tests/mcu.sh
 part "bare metal" tests/bare-metal.sh

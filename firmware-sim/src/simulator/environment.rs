@@ -71,7 +71,7 @@ impl Environment {
     }
 
     /// The environment's Python.
-    pub(super) fn python(&self) -> PathBuf {
+    pub fn python(&self) -> PathBuf {
         self.folder.join("bin").join("python")
     }
 

@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use armor_core::image::{PolicyImage, Precision};
+use armor_core::image::{Layout, PolicyImage, Precision};
 use armor_train::export::export;
 use armor_train::quantize::quantize;
 use firmware_sim::mcu::{Firmware, Flashed, MACHINES, Machine, McuError, SurveyPlan, survey};
@@ -20,16 +20,18 @@ const FIRMWARE_BYTES: u64 = 256 * 1024 - 187_000;
 const RAM_BYTES: u64 = 16 * 1024;
 const STACK_BYTES: u32 = 2048;
 
-/// A policy as wide as the loops of kernels are long, hardly trained, in two precisions.
-fn policies() -> [AlignedBytes; 2] {
+/// A policy as wide as the loops of kernels are long, hardly trained: in single
+/// precision, and in 8 bits in both layouts.
+fn policies() -> [AlignedBytes; 3] {
     let (data, run) = (made_up(), Run::new());
     let mut config = config(&["hidden=64", "kappa_hidden=16", "kappa_embedding=8", "normalize_states=true"]);
     config.steps = 20;
     run.fit(&config, &data, None);
     let float = export(&run.checkpoint(), &data, None).unwrap().bytes;
     let image = PolicyImage::new_checked(float.as_slice()).unwrap();
-    let int8 = quantize(&image, &data, Precision::Int8).unwrap().bytes;
-    [float, int8]
+    let int8 = |layout| quantize(&image, &data, Precision::Int8, layout).unwrap().bytes;
+    let (rows, paired) = (int8(Layout::Rows), int8(Layout::Paired));
+    [float, rows, paired]
 }
 
 fn built(name: &str) -> PathBuf {
