@@ -191,7 +191,7 @@ impl<'d, T: Scalar> Learner<'d, T> {
             value: (value, &parameters.state_value[..]),
         };
         let source = Source::new(&self.config, self.data, &self.normaliser);
-        Some(Cloning::new(&self.config, Advantages::new(&source, judges, self.data.len())))
+        Some(Cloning::new(&self.config, Advantages::new(&source, judges, self.config.traces())))
     }
 
     /// Draws a batch of uniform transitions with replacement, and the noise of behaviour cloning.

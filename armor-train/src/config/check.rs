@@ -49,6 +49,7 @@ impl Config {
             ("reweight_ema", self.reweight_ema),
             ("relabel_share", self.relabel_share),
             ("final_rate", self.final_rate),
+            ("advantage_decay", self.advantage_decay),
         ];
         for (key, value) in shares {
             require(key, (0.0..=1.0).contains(&value), "between 0 and 1")?;

@@ -15,8 +15,9 @@ use crate::actor::{CloningNorm, Family, Guidance, PolicyGradient, ReverseVarianc
 use crate::critic::bootstrap::Bootstrap;
 use crate::critic::{CostHeads, CostOutput, Trunk, TwinLoss};
 use crate::dual::DualClip;
-use crate::extraction::Extraction;
 use crate::extraction::condition::{Condition, LambdaRange};
+use crate::extraction::trace::Trace;
+use crate::extraction::{Advantage, Extraction};
 use crate::model::{ActorCopy, CriticCopy};
 use crate::pcgrad::{Order, Pooling};
 use crate::reweight::reference::Reference;
@@ -142,6 +143,10 @@ pub struct Config {
     pub critic_steps: u64,
     /// How the actor takes up what the critics know (Eqs. 13 to 15).
     pub extraction: Extraction,
+    /// By what advantage weights judge an action.
+    pub advantage: Advantage,
+    /// Decay of the trace where that is what was recorded.
+    pub advantage_decay: f64,
     /// Inverse temperature alpha of advantage weights.
     pub advantage_temperature: f64,
     /// Price lambda of cost in advantage weights, in units of scaled advantages.
@@ -231,6 +236,12 @@ impl Config {
             Condition::Kappa => self.kappa_scale,
             Condition::Lambda | Condition::None => 1.0,
         }
+    }
+
+    /// The traces of reward and long-term cost, where advantages follow the recording.
+    pub fn traces(&self) -> Option<[Trace; 2]> {
+        let trace = |discount| Trace { discount, decay: self.advantage_decay };
+        (self.advantage == Advantage::Recorded).then(|| [self.reward_discount, self.long_cost_discount].map(trace))
     }
 
     /// The prices of cost that an actor conditioned on them is trained for.

@@ -188,6 +188,14 @@ pub const OPTIONS: [(&str, &[Entry]); 6] = [
                 "extraction",
                 "how the actor takes up what the critics know: `guidance`, by their gradient at its actions (Eq. 15), or `weighted`, by cloning each recorded action with weight exp(min(cap, alpha (A_r - lambda A_cL))), A the advantage divided by its mean size over the data, times w of Eq. 10, divided by its mean over the batch",
             ),
+            (
+                "advantage",
+                "by what those weights judge an action: `critics`, their Q - V, or `recorded`, what its trajectory went on with against the state values (generalised advantage estimation), which tells the drivers of a mixed recording apart",
+            ),
+            (
+                "advantage_decay",
+                "how far `recorded` looks ahead: 0 is one step, 1 the trajectory's whole discounted return",
+            ),
             ("advantage_temperature", "inverse temperature alpha of those weights"),
             ("advantage_lambda", "price lambda of cost in those weights"),
             ("advantage_cap", "largest logarithm of those weights"),

@@ -8,8 +8,8 @@ use crate::actor::{CloningNorm, Family, Guidance, PolicyGradient, ReverseVarianc
 use crate::critic::bootstrap::Bootstrap;
 use crate::critic::{CostHeads, CostOutput, Trunk, TwinLoss};
 use crate::dual::DualClip;
-use crate::extraction::Extraction;
 use crate::extraction::condition::Condition;
+use crate::extraction::{Advantage, Extraction};
 use crate::model::{ActorCopy, CriticCopy};
 use crate::pcgrad::{Order, Pooling};
 use crate::reweight::reference::Reference;
@@ -94,6 +94,8 @@ impl Preset {
             cost_expectile: 0.5,
             critic_steps: 0,
             extraction: Extraction::Guidance,
+            advantage: Advantage::Critics,
+            advantage_decay: 1.0,
             advantage_temperature: 2.0,
             advantage_lambda: 2.0,
             advantage_cap: 3.0,

@@ -9,9 +9,13 @@ use rayon::prelude::*;
 use crate::batch::Batch;
 use crate::critic::value::StateValue;
 use crate::critic::{Critic, Task};
+use crate::extraction::trace::Trace;
 use crate::learner::SHARE;
 use crate::nn::Scalar;
 use crate::source::Source;
+
+/// The tasks whose advantages count.
+const TASKS: [Task; 2] = [Task::Reward, Task::LongCost];
 
 /// The critics whose opinion counts, and their parameters.
 #[derive(Clone, Copy)]
@@ -37,16 +41,24 @@ pub struct Advantages {
 }
 
 impl Advantages {
-    /// The advantages of the first `rows` transitions, which are all.
-    pub(crate) fn new<T: Scalar>(source: &Source<'_>, judges: Judges<'_, T>, rows: usize) -> Self {
-        let mut raw = vec![[0.0; 2]; rows];
+    /// The advantages of all transitions, by the critics alone, or along a trace of each task.
+    pub(crate) fn new<T: Scalar>(source: &Source<'_>, judges: Judges<'_, T>, traces: Option<[Trace; 2]>) -> Self {
+        let mut raw = vec![[0.0; 2]; source.data().len()];
         raw.par_chunks_mut(SHARE).enumerate().for_each(|(share, raw)| {
             let mut batch: Batch<T> = source.room(raw.len());
             for sample in 0..raw.len() {
                 source.fill(&mut batch, sample, share * SHARE + sample, 0.0);
             }
-            judges.judge(&batch, raw);
+            match traces {
+                None => judges.judge(&batch, raw),
+                Some(traces) => judges.differ(&batch, traces, raw),
+            }
         });
+        for (task, trace) in traces.iter().flatten().enumerate() {
+            for trajectory in source.data().trajectories() {
+                trace.extend(&mut raw[trajectory.rows.clone()], task);
+            }
+        }
         Self::scale(&raw)
     }
 
@@ -62,9 +74,24 @@ impl Advantages {
 }
 
 impl<T: Scalar> Judges<'_, T> {
+    /// The temporal differences of reward and long-term cost of a batch `[B]`.
+    ///
+    /// An episode that ended by its time limit would have gone on: its last state has a value.
+    fn differ(&self, batch: &Batch<T>, traces: [Trace; 2], out: &mut [[f64; 2]]) {
+        let (value, parameters) = self.value;
+        let [mut here, mut next] = [(); 2].map(|()| value.tape(batch.samples()));
+        value.forward(parameters, &TASKS, (&batch.state, &batch.kappa), &mut here, false);
+        value.forward(parameters, &TASKS, (&batch.next_state, &batch.next_kappa), &mut next, false);
+        for (place, (task, signal)) in TASKS.into_iter().zip([&batch.reward, &batch.cost]).enumerate() {
+            let values = here.values(task).zip(next.values(task)).zip(signal);
+            for (out, ((here, next), signal)) in out.iter_mut().zip(values) {
+                out[place] = signal.to_f64() + traces[place].discount * next.to_f64() - here.to_f64();
+            }
+        }
+    }
+
     /// `A_r` and `A_cL` of a batch `[B]`.
     fn judge(&self, batch: &Batch<T>, out: &mut [[f64; 2]]) {
-        const TASKS: [Task; 2] = [Task::Reward, Task::LongCost];
         let ((critic, target), (value, parameters)) = (self.critic, self.value);
         let (mut actions, mut states) = (critic.tape(batch.samples()), value.tape(batch.samples()));
         critic.forward(target, &TASKS, (&batch.state, &batch.kappa, &batch.action), &mut actions, false);
@@ -82,6 +109,7 @@ impl<T: Scalar> Judges<'_, T> {
 mod tests {
     use super::*;
     use crate::config::Preset;
+    use crate::extraction::Advantage;
     use crate::normaliser::Normaliser;
     use crate::testing::{fill, recording};
 
@@ -102,7 +130,7 @@ mod tests {
         let (critic, value) = (Critic::new(2, 1, 4, 4, 1.0), StateValue::new(2, 4, 1.0, [0.5; 3]));
         let (target, values) = (fill(critic.size(), 1), fill(value.size(), 2));
         let judges = Judges { critic: (&critic, &target), value: (&value, &values) };
-        let advantages = Advantages::new(&source, judges, data.len());
+        let advantages = Advantages::new(&source, judges, None);
         for row in [0, 1, SHARE - 1, SHARE, data.len() - 1] {
             let mut batch = source.room(1);
             source.fill(&mut batch, 0, row, 0.0);
@@ -112,6 +140,42 @@ mod tests {
             for ((scaled, scale), expected) in pairs.zip(alone[0]) {
                 let found = f64::from(*scaled) * scale;
                 assert!((found - expected).abs() < 1e-6, "row {row}: {found} is not {expected}");
+            }
+        }
+    }
+
+    /// The recorded return of the rest of a trajectory and the value behind it, above the state's own value.
+    #[test]
+    fn along_a_whole_trace_an_advantage_is_the_recorded_return_above_the_value() {
+        let data = recording(2, 70, |row| (row % 7) as f32, |row| f32::from(row % 3 == 0));
+        let mut config = Preset::Quick.config("own", 1.0);
+        (config.advantage, config.reward_discount, config.long_cost_discount) = (Advantage::Recorded, 0.9, 0.95);
+        let normaliser = Normaliser::new(&data, true);
+        let source = Source::new(&config, &data, &normaliser);
+        let (critic, value) = (Critic::new(2, 1, 4, 4, 0.0), StateValue::new(2, 4, 0.0, [0.5; 3]));
+        let (target, values) = (fill(critic.size(), 1), fill(value.size(), 2));
+        let judges = Judges { critic: (&critic, &target), value: (&value, &values) };
+        let found = Advantages::new(&source, judges, config.traces());
+        for row in [0, 3, 69, 70, SHARE, 139] {
+            for (place, discount) in [0.9f64, 0.95].into_iter().enumerate() {
+                let value_at = |row: usize, next: bool| {
+                    let mut batch = source.room(1);
+                    source.fill(&mut batch, 0, row, 0.0);
+                    let mut tape = value.tape(1);
+                    let state = if next { &batch.next_state } else { &batch.state };
+                    value.forward(&values, &TASKS, (state, &batch.kappa), &mut tape, false);
+                    tape.values(TASKS[place]).next().unwrap()
+                };
+                let end = data.trajectories()[data.trajectory(row)].rows.end;
+                let signal = |row: usize| match place {
+                    0 => config.reward_scale * f64::from(data.reward(row)),
+                    _ => f64::from(data.cost(row)),
+                };
+                let sum: f64 = (row..end).map(|row_| discount.powi((row_ - row) as i32) * signal(row_)).sum();
+                let behind = discount.powi((end - row) as i32) * value_at(end - 1, true);
+                let expected = sum + behind - value_at(row, false);
+                let advantage = f64::from(found.scaled[row][place]) * found.scales[place];
+                assert!((advantage - expected).abs() < 1e-6, "row {row}: {advantage} is not {expected}");
             }
         }
     }

@@ -3,6 +3,7 @@
 pub mod advantage;
 pub mod cloning;
 pub mod condition;
+pub mod trace;
 pub mod weight;
 
 use serde::{Deserialize, Serialize};
@@ -15,4 +16,14 @@ pub enum Extraction {
     Guidance,
     /// By cloning the recorded actions, each with the weight that its advantages earn it.
     Weighted,
+}
+
+/// By what the weights of cloning judge a recorded action.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Advantage {
+    /// The critics' `Q - V`.
+    Critics,
+    /// What the trajectory went on with, against the state values ([`trace`]).
+    Recorded,
 }
