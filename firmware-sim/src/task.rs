@@ -63,8 +63,8 @@ pub enum TaskError {
     },
 }
 
-/// Every task, native ones first.
-pub const TASKS: [Task; 18] = [
+/// Every task, native ones first; the last is not the paper's, but what `ball-circle` stands for.
+pub const TASKS: [Task; 19] = [
     native("ball-run", [7, 2, 100], [26.339754, 1327.44556], 5.0, 30),
     native("ball-circle", [8, 2, 200], [0.38312, 881.46338], 5.0, 10),
     native("point-circle", [28, 2, 500], [20.067627, 61.728195], 20.0, 50),
@@ -83,11 +83,13 @@ pub const TASKS: [Task; 18] = [
     simulated("SafetyCarGoal1-v0", [72, 2, 1000], [0.0122328, 39.907809], 20.0, 25),
     simulated("SafetyCarPush1-v0", [88, 2, 1000], [0.0137002, 16.304468], 20.0, 25),
     simulated("SafetyCarButton1-v0", [88, 2, 1000], [0.0028926, 44.420003], 20.0, 25),
+    simulated("SafetyBallCircle-v0", [8, 2, 200], [0.38312, 881.46338], 5.0, 10),
 ];
 
 /// Native tasks, and the simulators' tasks that they stand for.
-const STANDS_FOR: [(&str, &str); 3] = [
+const STANDS_FOR: [(&str, &str); 4] = [
     ("ball-run", "SafetyBallRun-v0"),
+    ("ball-circle", "SafetyBallCircle-v0"),
     ("point-circle", "SafetyPointCircle1-v0"),
     ("point-goal", "SafetyPointGoal1-v0"),
 ];

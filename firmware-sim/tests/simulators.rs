@@ -1,5 +1,5 @@
-//! An untrained policy flies an episode of each task of the paper, in its
-//! simulator. `tests/link.sh` runs this; it installs the simulators first.
+//! An untrained policy flies an episode of each task of the paper, and of
+//! ball-circle, in its simulator. `tests/link.sh` runs this; it installs the simulators first.
 
 #[path = "../src/fixture.rs"]
 #[expect(dead_code, reason = "other tests use the rest")]
@@ -82,6 +82,7 @@ episodes! {
     car_goal: "SafetyCarGoal1-v0",
     car_push: "SafetyCarPush1-v0",
     car_button: "SafetyCarButton1-v0",
+    ball_circle: "SafetyBallCircle-v0",
 }
 
 /// Three episodes are shared out over simulators in another way than one.

@@ -11,6 +11,7 @@ from armor_plant.client import Client, ControllerError
 from armor_plant.line import Line, Process, Socket
 from armor_plant.plants import SimulatorMissingError, make
 from armor_plant.tasks import TASKS, Task
+from armor_plant.wander import Wanderer
 
 
 def main() -> None:
@@ -41,6 +42,11 @@ def _parser() -> argparse.ArgumentParser:
         metavar="COMMAND",
         help="a command that serves on its standard streams, as 'firmware-sim serve IMAGE --stdio'",
     )
+    line.add_argument(
+        "--wander",
+        action="store_true",
+        help="no controller: smooth random actions, to record what a plant does",
+    )
     add("--limit", type=float, metavar="D", help="cost that an episode may incur (the paper's)")
     add("--episodes", type=_count, default=20, help="episodes to fly (20)")
     add("--first", type=_natural, default=0, help="number of the first of them (0)")
@@ -58,8 +64,7 @@ def _run(arguments: argparse.Namespace) -> None:
     limit = task.cost_limit if arguments.limit is None else arguments.limit
     if not 0 <= limit < 65536:
         raise ValueError("a cost limit is a number from 0 to below 65536")
-    client = Client(_line(arguments), arguments.patience)
-    _check_policy(client, task)
+    client = _controller(arguments, task)
     episodes = []
     for number in range(arguments.first, arguments.first + arguments.episodes):
         episode = flight.fly(plant, client, limit, flight.Seeds.of(arguments.seed, number))
@@ -75,6 +80,14 @@ def _run(arguments: argparse.Namespace) -> None:
         print(json.dumps(scores))
     else:
         print(report.text(scores))
+
+
+def _controller(arguments: argparse.Namespace, task: Task) -> flight.Controller:
+    if arguments.wander:
+        return Wanderer(task)
+    client = Client(_line(arguments), arguments.patience)
+    _check_policy(client, task)
+    return client
 
 
 def _line(arguments: argparse.Namespace) -> Line:

@@ -2,13 +2,26 @@
 
 import time
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from armor_plant.client import Client
 from armor_plant.messages import Act
 from armor_plant.plants import Plant
+
+
+class Controller(Protocol):
+    """What answers states with actions: the other end of a link, or a stand-in."""
+
+    def reset(self, limit: float, seed: int) -> float:
+        """Start an episode that may incur ``limit``; return its budget."""
+
+    def step(self, state: NDArray[np.float32], incurred: float) -> Act:
+        """Tell the state and the cost of the step before; return what to do."""
+
+    def close(self) -> None:
+        """Let go of it."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +57,7 @@ class Episode:
     """Seconds from a state to its action, the line and both codecs included."""
 
 
-def fly(plant: Plant, client: Client, limit: float, seeds: Seeds) -> Episode:
+def fly(plant: Plant, client: Controller, limit: float, seeds: Seeds) -> Episode:
     """Fly an episode that may incur ``limit``."""
     episode = Episode()
     observation = plant.reset(seeds.plant)

@@ -22,6 +22,9 @@ from armor_plant.tasks import TASKS, Task
 INSTALL = "pip install --no-deps -r firmware-sim/python/simulators.txt"
 """The command that installs the simulators, in the project's folder."""
 
+BULLET = ("SafetyAntRun-v0", "SafetyBallRun-v0", "SafetyDroneRun-v0", "SafetyBallCircle-v0")
+"""The tasks of Bullet-Safety-Gym; all others are Safety-Gymnasium's."""
+
 
 class SimulatorMissingError(Exception):
     """A simulator is not installed; the message says how to do that."""
@@ -59,7 +62,7 @@ def make(name: str) -> Plant:
     :class:`SimulatorMissingError` where its simulator is not installed.
     """
     task = TASKS[name]
-    is_bullet = task.name in ("SafetyAntRun-v0", "SafetyBallRun-v0", "SafetyDroneRun-v0")
+    is_bullet = task.name in BULLET
     try:
         with _quiet():
             _load_gymnasium()
