@@ -26,7 +26,8 @@ def test_actions_have_their_spread_and_are_forgotten_at_their_rate() -> None:
     found = actions(3, 200_000)
     # A normal entry is within its bounds in 2 Phi(1 / 0.8) - 1 of all steps.
     assert abs((np.abs(found) < 1).mean() - 0.7887) < 0.02
-    inside = np.abs(found).max(axis=1) < 0.9
+    # From so far inside the next step meets no bound.
+    inside = np.abs(found).max(axis=1) < 0.3
     now, then = found[:-1][inside[:-1]], found[1:][inside[:-1]]
     keep = float((now * then).sum() / (now * now).sum())
     assert DEVIATION == 0.8 and CORRELATION == 0.5

@@ -49,6 +49,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     add("--limit", type=float, metavar="D", help="cost that an episode may incur (the paper's)")
     add("--episodes", type=_count, default=20, help="episodes to fly (20)")
+    add("--steps", type=_count, metavar="N", help="steps of an episode (the task's horizon)")
     add("--first", type=_natural, default=0, help="number of the first of them (0)")
     add("--seed", type=_natural, default=0, help="decides the starts and the noise (0)")
     add("--patience", type=float, default=10.0, help="seconds to wait for an answer (10)")
@@ -61,13 +62,15 @@ def _parser() -> argparse.ArgumentParser:
 def _run(arguments: argparse.Namespace) -> None:
     plant = make(arguments.task)
     task = plant.task
+    steps = task.horizon if arguments.steps is None else min(arguments.steps, task.horizon)
     limit = task.cost_limit if arguments.limit is None else arguments.limit
     if not 0 <= limit < 65536:
         raise ValueError("a cost limit is a number from 0 to below 65536")
     client = _controller(arguments, task)
     episodes = []
     for number in range(arguments.first, arguments.first + arguments.episodes):
-        episode = flight.fly(plant, client, limit, flight.Seeds.of(arguments.seed, number))
+        seeds = flight.Seeds.of(arguments.seed, number)
+        episode = flight.fly(plant, client, limit, seeds, steps)
         episodes.append(episode)
         if arguments.each:
             print(_episode_json(number, episode), flush=True)

@@ -57,14 +57,14 @@ class Episode:
     """Seconds from a state to its action, the line and both codecs included."""
 
 
-def fly(plant: Plant, client: Controller, limit: float, seeds: Seeds) -> Episode:
-    """Fly an episode that may incur ``limit``."""
+def fly(plant: Plant, client: Controller, limit: float, seeds: Seeds, steps: int) -> Episode:
+    """Fly an episode of at most ``steps`` control steps that may incur ``limit``."""
     episode = Episode()
     observation = plant.reset(seeds.plant)
     episode.observations.append(observation)
     client.reset(limit, seeds.noise)
     incurred = 0.0
-    for _ in range(plant.task.horizon):
+    for _ in range(steps):
         started = time.perf_counter()
         act = client.step(observation, incurred)
         episode.round_trips.append(time.perf_counter() - started)

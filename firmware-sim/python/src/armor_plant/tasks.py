@@ -1,4 +1,4 @@
-"""The 14 tasks of the paper, and SafetyBallCircle-v0: sizes, horizons, and what scores are normalised by.
+"""The 14 tasks of the paper, and SafetyBallCircle-v0: sizes, horizons, constants of scores.
 
 ``tasks.json`` is written from the project's table (``firmware-sim/src/task.rs``).
 """
