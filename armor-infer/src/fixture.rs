@@ -1,8 +1,8 @@
 //! Policy images with random weights, for tests.
 
 use armor_core::image::{
-    ALIGNMENT, KappaRange, Layout, LevelScales, Manifest, PolicyImage, Precision, Provenance, Rung, SECTION_COUNT,
-    SectionKind, write,
+    KappaRange, Layout, LevelScales, Manifest, PolicyImage, Precision, Provenance, Rung, SECTION_ALIGNMENT,
+    SECTION_COUNT, SectionKind, write,
 };
 use armor_core::noise::Noise;
 use armor_core::schedule::{Sampler, Schedule};
@@ -221,7 +221,7 @@ impl Parts {
         let words: usize = contents.iter().map(|words| words.len()).sum();
         // Room for header, manifest and the padding of every section.
         let mut memory = vec![0; 4 * words + 4096];
-        let start = memory.as_ptr().align_offset(ALIGNMENT);
+        let start = memory.as_ptr().align_offset(SECTION_ALIGNMENT);
         write(&self.manifest, &contents, &mut memory[start..]).unwrap();
         Fixture { memory, start }
     }

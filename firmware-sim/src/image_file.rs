@@ -32,7 +32,7 @@ impl ImageFile {
         Ok(Self { path: path.into(), memory: AlignedBytes::read(path)? })
     }
 
-    /// The bytes, at a multiple of 16.
+    /// The bytes, at a multiple of 64.
     pub fn bytes(&self) -> &[u8] {
         self.memory.as_slice()
     }

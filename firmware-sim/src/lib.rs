@@ -16,7 +16,7 @@
 //! | [`latency_budget`] | a board's deadline as a test of a user's own |
 //! | [`reference`](mod@reference), [`verify`](mod@verify) | a second evaluation in f64; the checks of an image |
 //! | [`cli`] | the commands |
-//! | [`file`](mod@file), [`memory`] | files written whole; bytes on a 16-byte boundary |
+//! | [`file`](mod@file), [`memory`] | files written whole; bytes on a 64-byte boundary |
 //!
 //! What flies is always an image that was read back and checked, through the
 //! `armor-infer` that a microcontroller runs: nothing here computes an action

@@ -1,20 +1,25 @@
-//! Bytes at an address that is a multiple of 16, as images want them.
+//! Bytes at an address that is a multiple of 64, as images want them.
 
 use std::path::Path;
 
+use armor_core::image::SECTION_ALIGNMENT;
+
 use crate::file::{self, FileError};
 
-/// Bytes of any number, the first at a multiple of 16.
-#[derive(Clone, Debug, PartialEq, Eq)]
+/// Bytes of any number, the first at a multiple of 64.
+#[derive(Debug)]
 pub struct AlignedBytes {
-    words: Vec<u128>,
+    memory: Vec<u8>,
+    start: usize,
     length: usize,
 }
 
 impl AlignedBytes {
     /// Bytes of a value, such as the 0xFF of erased flash.
     pub fn filled(byte: u8, length: usize) -> Self {
-        Self { words: vec![u128::from_ne_bytes([byte; 16]); length.div_ceil(16)], length }
+        let memory = vec![byte; length + SECTION_ALIGNMENT - 1];
+        let start = memory.as_ptr().align_offset(SECTION_ALIGNMENT);
+        Self { memory, start, length }
     }
 
     /// A file's bytes.
@@ -27,14 +32,12 @@ impl AlignedBytes {
 
     /// The bytes.
     pub fn as_slice(&self) -> &[u8] {
-        let bytes: &[u8] = bytemuck::cast_slice(&self.words);
-        &bytes[..self.length]
+        &self.memory[self.start..][..self.length]
     }
 
     /// The bytes, to be changed.
     pub fn as_mut_slice(&mut self) -> &mut [u8] {
-        let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut self.words);
-        &mut bytes[..self.length]
+        &mut self.memory[self.start..][..self.length]
     }
 }
 
@@ -46,8 +49,20 @@ impl From<&[u8]> for AlignedBytes {
     }
 }
 
-// A `u128` is the memory; where it were less aligned, every image would be refused.
-const _: () = assert!(align_of::<u128>() >= armor_core::image::ALIGNMENT);
+impl Clone for AlignedBytes {
+    fn clone(&self) -> Self {
+        // Other memory has another first multiple.
+        Self::from(self.as_slice())
+    }
+}
+
+impl PartialEq for AlignedBytes {
+    fn eq(&self, other: &Self) -> bool {
+        self.as_slice() == other.as_slice()
+    }
+}
+
+impl Eq for AlignedBytes {}
 
 #[cfg(test)]
 mod tests {
@@ -55,11 +70,13 @@ mod tests {
 
     #[test]
     fn bytes_of_any_number_are_kept_and_aligned() {
-        for length in [0, 1, 15, 16, 17, 4096] {
+        for length in [0, 1, 63, 64, 65, 4096] {
             let bytes: Vec<u8> = (0..length).map(|i| i as u8).collect();
             let aligned = AlignedBytes::from(bytes.as_slice());
             assert_eq!(aligned.as_slice(), bytes);
-            assert!(aligned.as_slice().as_ptr().addr().is_multiple_of(16));
+            assert_eq!(aligned.clone().as_slice(), bytes);
+            assert!(aligned.clone().as_slice().as_ptr().addr().is_multiple_of(SECTION_ALIGNMENT));
+            assert!(aligned.as_slice().as_ptr().addr().is_multiple_of(SECTION_ALIGNMENT));
             assert_eq!(AlignedBytes::filled(0xFF, length).as_slice(), vec![0xFF; length]);
         }
     }

@@ -1,6 +1,6 @@
 //! Policy images for tests: well formed, and broken in one place.
 
-use super::header::{Header, checksum};
+use super::header::{Header, checksum, padded_manifest};
 use super::*;
 use crate::schedule::{Sampler, Schedule};
 use crate::shape::Shape;
@@ -162,7 +162,7 @@ pub(super) fn words(values: &[f32]) -> Vec<u32> {
 
 /// An image with valid checksums around any manifest bytes and body.
 pub(super) fn seal(manifest: &[u8], padding: u8, body: &[u8], manifest_length: usize) -> Result<(), ImageError> {
-    let padded = [manifest, &vec![padding; manifest.len().next_multiple_of(ALIGNMENT) - manifest.len()]].concat();
+    let padded = [manifest, &vec![padding; padded_manifest(manifest.len()).unwrap() - manifest.len()]].concat();
     let payload = [&padded, body].concat();
     let total_length = HEADER_BYTES + payload.len();
     let header = Header { manifest_length, total_length, payload_checksum: checksum(&payload) };
@@ -177,7 +177,7 @@ pub(super) fn resealed(edit: impl FnOnce(&mut Manifest<'_>)) -> Result<(), Image
     let image = PolicyImage::new_checked(memory.bytes()).unwrap();
     let mut manifest = image.manifest().clone();
     let mut buffer = [0; 1024];
-    let body = HEADER_BYTES + postcard::to_slice(&manifest, &mut buffer).unwrap().len().next_multiple_of(ALIGNMENT);
+    let body = HEADER_BYTES + padded_manifest(postcard::to_slice(&manifest, &mut buffer).unwrap().len()).unwrap();
     edit(&mut manifest);
     let encoded = postcard::to_slice(&manifest, &mut buffer).unwrap();
     seal(encoded, 0, &image.bytes()[body..], encoded.len())

@@ -10,13 +10,21 @@ pub const MAGIC: [u8; 4] = *b"ARMR";
 pub const VERSION: u16 = 1;
 /// Length of the header.
 pub const HEADER_BYTES: usize = 32;
-/// Alignment of the image and of each section in it.
+/// Alignment of the image in memory.
 pub const ALIGNMENT: usize = 16;
+/// Alignment of each section in the image: a cache line, so that where the image is aligned like that as well, no
+/// vector of weights lies across two.
+pub const SECTION_ALIGNMENT: usize = 64;
 
 /// Length of the header up to its own checksum.
 const CHECKED_BYTES: usize = 28;
 
 const CRC: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
+
+/// Length of a manifest with its padding; none where it is too long for any image.
+pub(super) fn padded_manifest(length: usize) -> Option<usize> {
+    HEADER_BYTES.checked_add(length)?.checked_next_multiple_of(SECTION_ALIGNMENT)?.checked_sub(HEADER_BYTES)
+}
 
 /// CRC-32 as in Ethernet and zip.
 pub(super) fn checksum(bytes: &[u8]) -> u32 {

@@ -1,7 +1,7 @@
 //! The policy image, version 1: what the trainer exports and the controller
 //! flies. `docs/image-format.md` is the normative byte layout.
 //!
-//! Header, manifest (postcard), then sections at 16-byte alignment that are
+//! Header, manifest (postcard), then sections at 64-byte alignment that are
 //! read in place. Bytes are checked once, in [`PolicyImage::new_checked`];
 //! after `Ok` no accessor fails, allocates or copies.
 
@@ -19,7 +19,7 @@ mod writer;
 
 pub use error::ImageError;
 pub use golden::{GoldenRow, GoldenTrace};
-pub use header::{ALIGNMENT, HEADER_BYTES, MAGIC, VERSION};
+pub use header::{ALIGNMENT, HEADER_BYTES, MAGIC, SECTION_ALIGNMENT, VERSION};
 pub use layout::Layout;
 pub use manifest::{
     KappaRange, MAX_RUNGS, Manifest, Precision, Provenance, Quality, Rung, SECTION_COUNT, Section, SectionKind,
@@ -56,7 +56,7 @@ impl<'a> PolicyImage<'a> {
         if header::checksum(payload) != header.payload_checksum {
             return Err(ImageError::Checksum);
         }
-        let padded_length = header.manifest_length.checked_next_multiple_of(ALIGNMENT).ok_or(ImageError::Header)?;
+        let padded_length = header::padded_manifest(header.manifest_length).ok_or(ImageError::Header)?;
         let (manifest_bytes, body) = payload.split_at_checked(padded_length).ok_or(ImageError::Header)?;
         let manifest = Manifest::read(manifest_bytes, header.manifest_length)?;
         let sections = Sections::read(&manifest, body)?;

@@ -2,7 +2,7 @@
 
 use super::manifest::{Manifest, SectionKind};
 use super::sections::Dense;
-use super::{ALIGNMENT, ImageError};
+use super::{ImageError, SECTION_ALIGNMENT};
 use crate::budget_map::BudgetMap;
 
 /// Takes the sections from the body, one after the other.
@@ -26,7 +26,7 @@ impl<'m, 'a> Reader<'m, 'a> {
         let error = ImageError::Section(kind);
         let section = self.manifest.sections.get(self.next).ok_or(error)?;
         let (offset, length) = (section.offset as usize, section.length as usize);
-        if section.kind != kind || offset != self.end.next_multiple_of(ALIGNMENT) {
+        if section.kind != kind || offset != self.end.next_multiple_of(SECTION_ALIGNMENT) {
             return Err(error);
         }
         if count.is_some_and(|count| length != 4 * count) {

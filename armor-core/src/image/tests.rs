@@ -173,7 +173,7 @@ fn manifest_bytes_that_say_more_or_less_are_refused() {
     let image = PolicyImage::new_checked(memory.bytes()).unwrap();
     let mut buffer = [0; 1024];
     let encoded = postcard::to_slice(image.manifest(), &mut buffer).unwrap();
-    let padded = encoded.len().next_multiple_of(ALIGNMENT);
+    let padded = header::padded_manifest(encoded.len()).unwrap();
     assert_ne!(encoded.len(), padded, "no padding to test with");
     let body = &image.bytes()[HEADER_BYTES + padded..length];
     assert_eq!(seal(encoded, 0, body, encoded.len()), Ok(()));

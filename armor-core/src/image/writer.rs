@@ -4,7 +4,7 @@ use core::fmt;
 
 use super::header::{self, Header};
 use super::manifest::{Manifest, SECTION_COUNT, Section, SectionKind};
-use super::{ALIGNMENT, HEADER_BYTES, ImageError, PolicyImage};
+use super::{HEADER_BYTES, ImageError, PolicyImage, SECTION_ALIGNMENT};
 
 /// Why an image could not be written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -44,7 +44,7 @@ pub fn write(manifest: &Manifest<'_>, contents: &[&[u32]; SECTION_COUNT], out: &
         all.filter(|(kind, words)| !(kind.is_optional() && words.is_empty()))
     };
     for (kind, words) in present() {
-        let offset = end.next_multiple_of(ALIGNMENT);
+        let offset = end.next_multiple_of(SECTION_ALIGNMENT);
         let section = Section { kind, offset: offset as u32, length: 4 * words.len() as u32 };
         manifest.sections.push(section).map_err(|_| WriteError::Full)?;
         end = offset + 4 * words.len();
@@ -53,7 +53,7 @@ pub fn write(manifest: &Manifest<'_>, contents: &[&[u32]; SECTION_COUNT], out: &
     out.fill(0);
     let (header_out, payload) = out.split_at_mut_checked(HEADER_BYTES).ok_or(WriteError::Full)?;
     let manifest_length = postcard::to_slice(&manifest, payload).map_err(|_| WriteError::Full)?.len();
-    let manifest_padded = manifest_length.next_multiple_of(ALIGNMENT);
+    let manifest_padded = header::padded_manifest(manifest_length).ok_or(WriteError::Full)?;
     let payload = payload.get_mut(..manifest_padded + end).ok_or(WriteError::Full)?;
     let (_, body) = payload.split_at_mut_checked(manifest_padded).ok_or(WriteError::Full)?;
     for (section, (_, words)) in manifest.sections.iter().zip(present()) {

@@ -7,6 +7,8 @@
 
 #[cfg(all(feature = "std", target_arch = "x86_64"))]
 mod avx2;
+#[cfg(all(feature = "std", target_arch = "x86_64"))]
+mod avx512;
 mod check;
 #[cfg(all(feature = "dsp", target_arch = "arm"))]
 mod cortex_m;
@@ -27,6 +29,9 @@ pub enum Kernel {
     /// 256-bit vectors, on x86-64 with the feature `std`.
     #[cfg(all(feature = "std", target_arch = "x86_64"))]
     Avx2(avx2::Avx2),
+    /// 512-bit vectors, likewise, and VNNI where the processor has it.
+    #[cfg(all(feature = "std", target_arch = "x86_64"))]
+    Avx512(avx512::Avx512),
     /// 16-bit SIMD and the FPU of a Cortex-M4, M7, M33 or M55.
     #[cfg(all(feature = "dsp", target_arch = "arm"))]
     CortexM,
@@ -44,7 +49,7 @@ impl Kernel {
     /// The kernels that this machine can run, the fastest last.
     pub fn available() -> impl Iterator<Item = Self> {
         #[cfg(all(feature = "std", target_arch = "x86_64"))]
-        let more = avx2::Avx2::detect().map(Self::Avx2);
+        let more = avx2::Avx2::detect().map(Self::Avx2).into_iter().chain(avx512::Avx512::detect().map(Self::Avx512));
         #[cfg(all(feature = "dsp", target_arch = "arm"))]
         let more = Some(Self::CortexM);
         #[cfg(not(any(all(feature = "std", target_arch = "x86_64"), all(feature = "dsp", target_arch = "arm"))))]
@@ -63,6 +68,8 @@ impl Kernel {
             Self::Portable => "portable",
             #[cfg(all(feature = "std", target_arch = "x86_64"))]
             Self::Avx2(_) => "avx2",
+            #[cfg(all(feature = "std", target_arch = "x86_64"))]
+            Self::Avx512(kernel) => kernel.name(),
             #[cfg(all(feature = "dsp", target_arch = "arm"))]
             Self::CortexM => "cortex-m",
         }
@@ -84,6 +91,8 @@ impl Kernel {
             Self::Portable => float::accumulate::<WIDE>(weights, x, out),
             #[cfg(all(feature = "std", target_arch = "x86_64"))]
             Self::Avx2(kernel) => kernel.accumulate(weights, x, out),
+            #[cfg(all(feature = "std", target_arch = "x86_64"))]
+            Self::Avx512(kernel) => kernel.accumulate(weights, x, out),
             #[cfg(all(feature = "dsp", target_arch = "arm", target_abi = "eabihf"))]
             Self::CortexM => cortex_m::accumulate(weights, x, out),
             #[cfg(all(feature = "dsp", target_arch = "arm", not(target_abi = "eabihf")))]
@@ -97,6 +106,8 @@ impl Kernel {
             Self::Portable => float::mish(values),
             #[cfg(all(feature = "std", target_arch = "x86_64"))]
             Self::Avx2(kernel) => kernel.mish(values),
+            #[cfg(all(feature = "std", target_arch = "x86_64"))]
+            Self::Avx512(kernel) => kernel.mish(values),
             #[cfg(all(feature = "dsp", target_arch = "arm"))]
             Self::CortexM => float::mish(values),
         }
@@ -117,6 +128,8 @@ impl Kernel {
         match self {
             #[cfg(all(feature = "std", target_arch = "x86_64"))]
             Self::Avx2(kernel) if layout == Layout::Rows => kernel.sum_rows(weights, codes, bits, sums),
+            #[cfg(all(feature = "std", target_arch = "x86_64"))]
+            Self::Avx512(kernel) if layout == Layout::Rows => kernel.sum_rows(weights, codes, bits, sums),
             #[cfg(all(feature = "dsp", target_arch = "arm"))]
             Self::CortexM if layout == Layout::Paired => cortex_m::sum_pairs(weights, codes, bits, sums),
             #[cfg(all(feature = "cortex-m55", target_arch = "arm"))]
@@ -135,6 +148,8 @@ impl Kernel {
             Self::Portable => integer::rescale(sums, bits, multiplier, factor, bias),
             #[cfg(all(feature = "std", target_arch = "x86_64"))]
             Self::Avx2(kernel) => kernel.rescale(sums, bits, multiplier, factor, bias),
+            #[cfg(all(feature = "std", target_arch = "x86_64"))]
+            Self::Avx512(kernel) => kernel.rescale(sums, bits, multiplier, factor, bias),
             #[cfg(all(feature = "dsp", target_arch = "arm"))]
             Self::CortexM => cortex_m::rescale(sums, bits, multiplier, factor, bias),
         }
@@ -146,6 +161,8 @@ impl Kernel {
             Self::Portable => integer::activate(pre, factor, bits, codes),
             #[cfg(all(feature = "std", target_arch = "x86_64"))]
             Self::Avx2(kernel) => kernel.activate(pre, factor, bits, codes),
+            #[cfg(all(feature = "std", target_arch = "x86_64"))]
+            Self::Avx512(kernel) => kernel.activate(pre, factor, bits, codes),
             #[cfg(all(feature = "dsp", target_arch = "arm"))]
             Self::CortexM => cortex_m::activate(pre, factor, bits, codes),
         }

@@ -1,8 +1,8 @@
 //! Makes the image, measures it, and makes it again with what was measured.
 
 use armor_core::image::{
-    KappaRange, Layout, MAX_RUNGS, Manifest, PolicyImage, Precision, Provenance, Quality, Rung, SECTION_COUNT,
-    SectionKind, write,
+    KappaRange, Layout, MAX_RUNGS, Manifest, PolicyImage, Precision, Provenance, Quality, Rung, SECTION_ALIGNMENT,
+    SECTION_COUNT, SectionKind, write,
 };
 use armor_core::schedule::Sampler;
 use armor_core::shape::Shape;
@@ -165,7 +165,8 @@ pub fn released(image: &PolicyImage<'_>, release: u32) -> Result<ImageBytes, Exp
 
 /// Writes an image into memory of its size.
 pub(crate) fn build(manifest: &Manifest<'_>, sections: &[Vec<u32>; SECTION_COUNT]) -> Result<ImageBytes, ExportError> {
-    let capacity = OVERHEAD + sections.iter().map(|words| (4 * words.len()).next_multiple_of(16)).sum::<usize>();
+    let capacity =
+        OVERHEAD + sections.iter().map(|words| (4 * words.len()).next_multiple_of(SECTION_ALIGNMENT)).sum::<usize>();
     let mut bytes = ImageBytes::filled(0, capacity);
     let length = write(manifest, &sections.each_ref().map(Vec::as_slice), bytes.as_mut_slice())?;
     Ok(ImageBytes::from(&bytes.as_slice()[..length]))
