@@ -119,31 +119,6 @@ mod tests {
         affine(network.output.weights, network.output.bias, &layer_3)
     }
 
-    /// A map through (b, b) and (2b, b) is the budget itself up to b, and holds b from there on.
-    #[test]
-    fn a_mapped_budget_has_the_bits_of_the_budget_it_maps_to() {
-        let plain = Fixture::random(fixture::SMALL, 1);
-        let mut mapped = plain.clone();
-        let knot = |budget: u32, condition: f32| [budget << 16, condition.to_bits()];
-        *mapped.section(armor_core::image::SectionKind::BudgetMap) =
-            [knot(0, 0.0), knot(8, 8.0), knot(16, 8.0)].concat();
-        let context = |fixture: &Fixture, kappa: f32| {
-            let image = fixture.image();
-            let (policy, kappa) = (Policy::load(&image).unwrap(), Cost::from_incurred(kappa).unwrap());
-            let Network::Float(network) = &policy.sections.network else {
-                panic!("the fixture is in single precision")
-            };
-            let mut denoiser = FloatDenoiser::<16, 256>::new();
-            denoiser.prepare(&policy, network, &[0.5, -0.5, 1.0], kappa);
-            denoiser.context.map(f32::to_bits)
-        };
-        let (plain, mapped) = (plain.build(), mapped.build());
-        for (kappa, seen) in [(0.0, 0.0), (3.25, 3.25), (8.0, 8.0), (11.0, 8.0), (40.0, 8.0)] {
-            assert_eq!(context(&mapped, kappa), context(&plain, seen), "{kappa}");
-        }
-        assert_ne!(context(&plain, 3.25), context(&plain, 8.0));
-    }
-
     #[test]
     fn the_hoisted_denoiser_is_the_plain_one() {
         let odd = Shape { state: 5, action: 3, hidden: 37, kappa_hidden: 9, kappa_embedding: 41, steps: 7 };

@@ -118,3 +118,51 @@ fn affine(kernel: Kernel, layer: &Dense<'_>, x: &[f32], out: &mut [f32]) {
     }
     kernel.accumulate(layer.weights, x, out);
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixture::{Fixture, Parts, SMALL};
+    use armor_core::image::{Precision, SectionKind};
+    use armor_core::shape::Shape;
+
+    fn fixture(shape: Shape, precision: Precision) -> Parts {
+        match precision {
+            Precision::F32 => Fixture::random(shape, 1),
+            integers => Fixture::integers(shape, integers, 1),
+        }
+    }
+
+    /// A map through (b, b) and (2b, b) is the budget itself up to b, and holds b from there on.
+    #[test]
+    fn a_mapped_budget_has_the_bits_of_the_budget_it_maps_to() {
+        let knot = |budget: u32, condition: f32| [budget << 16, condition.to_bits()];
+        let eps = |fixture: &Fixture, kappa: f32| {
+            let image = fixture.image();
+            let (policy, kappa) = (Policy::load(&image).unwrap(), Cost::from_incurred(kappa).unwrap());
+            let mut denoiser = Denoiser::<16, 256>::new(&policy);
+            let mut eps = [0.0; 2];
+            denoiser.prepare(&policy, &[0.5, -0.5, 1.0], kappa).unwrap();
+            denoiser.eps(&policy, 1, &[0.25, -1.0], &mut eps);
+            eps.map(f32::to_bits)
+        };
+        for precision in [Precision::F32, Precision::Int16x8, Precision::Int8] {
+            let plain = fixture(SMALL, precision);
+            let mut mapped = plain.clone();
+            *mapped.section(SectionKind::BudgetMap) = [knot(0, 0.0), knot(8, 8.0), knot(16, 8.0)].concat();
+            let (plain, mapped) = (plain.build(), mapped.build());
+            for (kappa, seen) in [(0.0, 0.0), (3.25, 3.25), (8.0, 8.0), (11.0, 8.0), (40.0, 8.0)] {
+                assert_eq!(eps(&mapped, kappa), eps(&plain, seen), "{precision:?}, {kappa}");
+            }
+            assert_ne!(eps(&plain, 3.25), eps(&plain, 8.0), "{precision:?}");
+        }
+    }
+
+    /// What the default network may take of a small flash.
+    #[test]
+    fn the_default_network_in_8_bits_is_within_190_kib() {
+        let shape = Shape { state: 60, action: 2, hidden: 256, kappa_hidden: 32, kappa_embedding: 16, steps: 20 };
+        let bytes = fixture(shape, Precision::Int8).build().image().bytes().len();
+        assert!(bytes <= 190 * 1024, "{bytes} bytes");
+    }
+}

@@ -1,5 +1,6 @@
 //! The command line, as a shell sees it.
 
+mod drift;
 mod quickstart;
 mod refusals;
 mod reports;

@@ -153,11 +153,12 @@ impl fmt::Display for Report {
         writeln!(f, "trained by    armor-train {version}, preset {preset}, seed {seed}, {steps} steps")?;
         writeln!(f, "data          {}", provenance.data_sha256)?;
         writeln!(f, "config        {}", provenance.config_sha256)?;
-        writeln!(f, "agreement     {:.1e} between trainer and image", self.agreement_max_abs)?;
+        let other = if self.precision == Precision::F32 { "trainer" } else { "the image in F32" };
+        writeln!(f, "agreement     {:.1e} between {other} and image", self.agreement_max_abs)?;
         writeln!(f, "golden trace  {} rows", self.golden_rows)?;
         for flown in &self.quality {
             let Flown { rung, cost_limit, episodes, reward_normalized, cost_normalized } = flown;
-            writeln!(f, "flown         rung {rung}, limit {cost_limit}, {episodes} episodes")?;
+            writeln!(f, "flown         rung {rung} in {:?}, limit {cost_limit}, {episodes} episodes", self.precision)?;
             writeln!(f, "              reward {reward_normalized:.3}, cost {cost_normalized:.3} (normalised)")?;
         }
         write!(f, "section             offset     bytes")?;
