@@ -29,3 +29,4 @@ part "workspace" cargo test --workspace --locked --no-fail-fast
 part "embedding" tests/embedding.sh
 part "link" tests/link.sh
 part "bare metal" tests/bare-metal.sh
+part "no panic" tests/no-panic.sh
