@@ -12,6 +12,7 @@ mod options;
 
 pub mod bootstrap;
 mod expectile;
+mod twins;
 pub mod value;
 
 use nalgebra::DMatrix;
@@ -19,6 +20,7 @@ use nalgebra::DMatrix;
 use crate::nn::{Activation, Mlp, Scalar, Tape};
 
 pub use options::{CostHeads, CostOutput, CriticOptions, Trunk, TwinLoss};
+pub use twins::{Pick, Twins};
 
 /// What a pair of heads estimates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -187,11 +189,11 @@ impl Critic {
     }
 
     /// The gradient of `sum_b sum_f slope_f,b Q_f(s, kappa, a)_b` with respect to the
-    /// action, `A x B`, where `Q_f` is the pessimistic twin of the last forward pass.
+    /// action, `A x B`, where `Q_f` is what `pick` makes of the twins of the last forward pass.
     pub fn action_gradient<T: Scalar>(
         &self,
         parameters: &[T],
-        slopes: &[(Task, &[T])],
+        (slopes, pick): (&[(Task, &[T])], Pick),
         tape: &mut CriticTape<T>,
         action_gradient: &mut DMatrix<T>,
     ) {
@@ -200,9 +202,9 @@ impl Critic {
             let (pair, trunk) = (self.options.head_of(task), self.options.trunk_of(task));
             let [one, two] = &mut tape.heads[pair];
             for (sample, &slope) in slope.iter().enumerate() {
-                let first_is_worse = task.is_worse(one.output()[sample], two.output()[sample]);
-                one.output_gradient()[sample] = if first_is_worse { slope } else { T::zero() };
-                two.output_gradient()[sample] = if first_is_worse { T::zero() } else { slope };
+                let [of_one, of_two] = pick.weights(task, [one.output()[sample], two.output()[sample]]);
+                one.output_gradient()[sample] = of_one * slope;
+                two.output_gradient()[sample] = of_two * slope;
             }
             for (head, head_tape) in self.heads[pair].iter().zip([one, two]) {
                 let trunk_tape = &mut tape.trunks[trunk];
@@ -224,9 +226,14 @@ impl<T: Scalar> CriticTape<T> {
     /// The pessimistic twin of a task from the last forward pass: the minimum
     /// of rewards, the maximum of costs.
     pub fn pessimistic(&self, task: Task) -> impl Iterator<Item = T> {
+        self.values(task, Pick::PESSIMISTIC)
+    }
+
+    /// What `pick` makes of the twins of a task from the last forward pass.
+    pub fn values(&self, task: Task, pick: Pick) -> impl Iterator<Item = T> {
         let [one, two] = &self.heads[self.options.head_of(task)];
         let twins = one.output().iter().zip(two.output().iter());
-        twins.map(move |(&one, &two)| if task.is_worse(one, two) { one } else { two })
+        twins.map(move |(&one, &two)| pick.value(task, [one, two]))
     }
 }
 

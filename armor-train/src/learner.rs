@@ -18,7 +18,9 @@ use crate::nn::{Scalar, dot, soft_update};
 use crate::normaliser::Normaliser;
 use crate::pcgrad::{self, Order};
 use crate::phase::Phase;
-use crate::reweight::{Reweighting, Weights};
+use crate::reweight::{self, Reweighting, WeightMean, Weights};
+use crate::sampling::Rows;
+use crate::selection::{Choice, Selection};
 use crate::source::Source;
 use crate::stream;
 use crate::update::{CriticMetrics, Worker, update_actor, update_critic, update_imitation, update_target};
@@ -35,6 +37,7 @@ pub struct Learner<'d, T: Scalar> {
     config: Config,
     data: &'d Dataset,
     normaliser: Normaliser,
+    rows: Rows,
     model: Model,
     noise: Noise,
     reweighting: Reweighting,
@@ -54,16 +57,21 @@ pub struct LearnerState<T: Scalar> {
     pub parameters: Parameters<T>,
     /// Their optimisers.
     pub optimisers: Optimisers<T>,
-    /// `w_cf` of each transition; all 1 before the first refresh.
+    /// `w_cf` of each transition, or `w` where that is averaged; all 1 before the first refresh.
     pub counterfactual: Vec<f32>,
     /// Share of the transitions that the last refresh raised.
     pub counterfactual_active: f64,
+    /// The actor with the smallest cloning loss so far; none where the last one flies.
+    pub selection: Selection<T>,
 }
 
 impl<T: Scalar> LearnerState<T> {
-    /// The actor's weights that fly: their moving average, where one is kept.
+    /// The actor's weights that fly: those that were chosen, else their moving average, where one is kept.
     pub fn flying_actor(&self) -> &[T] {
-        self.parameters.actor_copy(ActorCopy::Average)
+        match &self.selection.actor[..] {
+            [] => self.parameters.actor_copy(ActorCopy::Average),
+            chosen => chosen,
+        }
     }
 }
 
@@ -95,6 +103,7 @@ impl<'d, T: Scalar> Learner<'d, T> {
             parameters,
             counterfactual: vec![1.0; data.len()],
             counterfactual_active: 0.0,
+            selection: Selection::new(),
         };
         Self::resume(config, data, state)
     }
@@ -113,6 +122,7 @@ impl<'d, T: Scalar> Learner<'d, T> {
         Self {
             data,
             normaliser: Normaliser::new(data, config.normalize_states),
+            rows: Rows::new(config.sampling, data),
             model,
             noise: Noise::new(config.seed),
             reweighting,
@@ -178,7 +188,11 @@ impl<'d, T: Scalar> Learner<'d, T> {
             let average_rate = T::of(1.0 - self.config.actor_average);
             soft_update(&mut parameters.actor_average, &parameters.actor, average_rate);
         }
+        if self.config.weight_decay > 0.0 {
+            optimisers.shrink(parameters, self.config.weight_decay, [phase.trains_critics(), phase.trains_actor()]);
+        }
         self.state.step += 1;
+        self.select(&metrics);
         metrics
     }
 
@@ -194,7 +208,17 @@ impl<'d, T: Scalar> Learner<'d, T> {
         Some(Cloning::new(&self.config, Advantages::new(&source, judges, self.config.traces())))
     }
 
-    /// Draws a batch of uniform transitions with replacement, and the noise of behaviour cloning.
+    /// Looks at the cloning loss of a step, where it decides which actor flies. Losses before
+    /// the weights are in use are of another data set.
+    fn select(&mut self, metrics: &Metrics) {
+        let (Choice::CloningLoss, Some(actor)) = (self.config.selection, metrics.actor) else { return };
+        if self.reweighting.is_in_use(self.state.step) {
+            let LearnerState { parameters, selection, .. } = &mut self.state;
+            selection.push(actor.cloning, parameters.actor_copy(ActorCopy::Average));
+        }
+    }
+
+    /// Draws a batch of transitions with replacement, and the noise of behaviour cloning.
     ///
     /// Weights are those of Eq. 10; where there are advantages, their logarithm plus that of the advantage weight.
     fn gather(&mut self) {
@@ -202,18 +226,26 @@ impl<'d, T: Scalar> Learner<'d, T> {
         let levels = self.config.diffusion_steps as u32;
         let source = Source::new(&self.config, self.data, &self.normaliser);
         let (cloning, condition) = (self.cloning.as_ref(), self.config.condition);
-        let (weights, rows) = (&self.reweighting.weights().combined, self.data.len() as u32);
+        let (weights, rows) = (self.reweighting.weights(), &self.rows);
+        let by_batch = self.config.weight_mean == WeightMean::Batch && self.reweighting.is_in_use(step + 1);
+        let counterfactual = &self.state.counterfactual;
+        let weight = |row: usize| match by_batch {
+            true => weights.product(self.data, counterfactual, row),
+            false => f64::from(weights.combined[row]),
+        };
+        let [twin, ..] = noise.words(stream::TWINS, step, 0);
         self.workers.par_iter_mut().for_each(|worker| {
+            worker.second_twin = twin & 1 == 1;
             for sample in 0..worker.batch.samples() {
                 let place = worker.first + sample;
                 let word = |stream| noise.words(stream, step, place as u32 / 4)[place % 4];
-                let row = below(word(stream::ROWS), rows) as usize;
+                let row = rows.draw(word);
                 let extra = source.larger_budget(row, word(stream::BUDGET), word(stream::RELABEL));
                 source.fill(&mut worker.batch, sample, row, extra);
                 let leniency = uniform(word(stream::LENIENCY));
                 worker.batch.weight[sample] = match cloning {
-                    None => T::of_f32(weights[row]),
-                    Some(cloning) => T::of(f64::from(weights[row]).ln() + cloning.log_weight(row, f64::from(leniency))),
+                    None => T::of(weight(row)),
+                    Some(cloning) => T::of(weight(row).ln() + cloning.log_weight(row, f64::from(leniency))),
                 };
                 match condition {
                     Condition::Kappa => {}
@@ -225,6 +257,11 @@ impl<'d, T: Scalar> Learner<'d, T> {
                 stream::fill_normal(noise, stream::CLONING, step * batch + place as u64, column.as_mut_slice());
             }
         });
+        if by_batch {
+            let mut shares: Vec<&mut [T]> =
+                self.workers.iter_mut().map(|worker| &mut worker.batch.weight[..]).collect();
+            reweight::normalise(&mut shares, [self.config.weight_min, self.config.weight_max]);
+        }
     }
 
     /// Refreshes the weights of all transitions (Eqs. 8 to 10).

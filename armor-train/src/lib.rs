@@ -35,6 +35,8 @@ pub mod quantize;
 pub mod report;
 pub mod reweight;
 pub mod run;
+pub mod sampling;
+pub mod selection;
 mod source;
 mod stream;
 pub mod study;

@@ -11,7 +11,7 @@ use crate::critic::bootstrap::Bootstrap;
 use crate::critic::value::StateValue;
 use crate::critic::{Critic, CriticOptions, Trunk};
 use crate::dual::{Dual, DualOptions};
-use crate::nn::{Adam, Scalar};
+use crate::nn::{Adam, Scalar, TimeFrequencies};
 use crate::pcgrad::{Order, Pooling};
 use crate::phase::Phase;
 use crate::stream;
@@ -139,6 +139,10 @@ impl Model {
             temperature: config.temperature,
         };
         let denoiser = Denoiser::new(widths, config.condition_scale());
+        let denoiser = match config.time_frequencies {
+            TimeFrequencies::Geometric => denoiser,
+            TimeFrequencies::Learned => denoiser.with_learned_frequencies(),
+        };
         // A critic that shall not tell budgets apart sees 0.
         let critic_scale = if config.critic_sees_kappa { config.kappa_scale } else { 0.0 };
         let expectiles = [config.reward_expectile, config.cost_expectile, config.cost_expectile];
@@ -155,6 +159,7 @@ impl Model {
                 eta: config.eta,
                 guidance: config.guidance,
                 constraint_scale: if config.dual_normalize { 1.0 / (config.limit * config.cost_scale) } else { 1.0 },
+                twins: config.policy_twins,
             },
             critic: Critic::with_options(
                 CriticOptions {
@@ -238,12 +243,56 @@ impl<T: Scalar> Optimisers<T> {
         self.state_value.set_rate(config.critic_rate * factor);
         self.dual.set_rate(config.dual_rate * factor);
     }
+
+    /// Shrinks the weights of actor and critics by `decay` times their learning rates (AdamW,
+    /// Loshchilov and Hutter 2019).
+    pub fn shrink(&self, parameters: &mut Parameters<T>, decay: f64, [critics, actor]: [bool; 2]) {
+        let Parameters { actor: of_actor, critic, state_value, .. } = parameters;
+        let networks = [
+            (critics, &self.critic, critic),
+            (critics, &self.state_value, state_value),
+            (actor, &self.actor, of_actor),
+        ];
+        for (_, optimiser, weights) in networks.into_iter().filter(|(trains, ..)| *trains) {
+            let factor = T::of(1.0 - decay * optimiser.rate());
+            weights.iter_mut().for_each(|weight| *weight *= factor);
+        }
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::config::Preset;
+
+    #[test]
+    fn weights_shrink_by_decay_times_rate_where_they_are_trained() {
+        let mut config = Preset::Paper.config("own", 1.0);
+        (config.actor_rate, config.critic_rate) = (0.1, 0.2);
+        let weights = |parameters: &Parameters<f64>| {
+            [&parameters.critic, &parameters.state_value, &parameters.actor, &parameters.dual].map(|w| w[0])
+        };
+        for (trained, expected) in [
+            ([true, true], [0.9, 0.9, 0.95, 1.0]),
+            ([true, false], [0.9, 0.9, 1.0, 1.0]),
+            ([false, true], [1.0, 1.0, 0.95, 1.0]),
+        ] {
+            let one = || vec![1.0];
+            let mut parameters = Parameters {
+                actor: one(),
+                actor_average: one(),
+                critic: one(),
+                target: one(),
+                state_value: one(),
+                dual: one(),
+            };
+            let optimisers = Optimisers::new(&config, &parameters);
+            optimisers.shrink(&mut parameters, 0.5, trained);
+            for (found, expected) in weights(&parameters).into_iter().zip(expected) {
+                assert!((found - expected).abs() < 1e-12);
+            }
+        }
+    }
 
     /// Adam's first step is as long as its learning rate.
     #[test]

@@ -71,7 +71,8 @@ impl<'a> Source<'a> {
             Threshold::Discounted => kappa * ratio(config.long_cost_discount, remaining),
         };
         batch.threshold[sample] = T::of(spendable + config.cost_scale * config.dual_slack);
-        batch.alive[sample] = if data.done(row) { T::zero() } else { T::one() };
+        let ends = data.ending(row).is_some_and(|ending| config.done_mask.ends(ending));
+        batch.alive[sample] = if ends { T::zero() } else { T::one() };
     }
 }
 
@@ -79,6 +80,7 @@ impl<'a> Source<'a> {
 mod tests {
     use super::*;
     use crate::config::Preset;
+    use crate::data::{Ending, Mask, Recording, Unfinished};
     use crate::testing::dataset;
 
     /// The batch of all rows of the test data, each budget raised by `extra`.
@@ -89,6 +91,49 @@ mod tests {
         let mut batch = source.room(data.len());
         (0..data.len()).for_each(|row| source.fill(&mut batch, row, row, extra));
         batch
+    }
+
+    /// Rows 0 to 1 end by the task's rule, 2 to 3 by the time limit, 4 to 5 not at all.
+    fn endings(unfinished: Unfinished) -> Dataset {
+        let rows = 6;
+        let recording = Recording {
+            state_dim: 1,
+            action_dim: 1,
+            observations: vec![0.0; rows],
+            next_observations: vec![0.0; rows],
+            actions: vec![0.0; rows],
+            rewards: vec![0.0; rows],
+            costs: vec![1.0; rows],
+            terminals: (0..rows).map(|row| row == 1).collect(),
+            timeouts: (0..rows).map(|row| row == 3).collect(),
+            sha256: [0; 32],
+        };
+        Dataset::with_unfinished(recording, unfinished).unwrap()
+    }
+
+    #[test]
+    fn what_ends_an_episode_for_good_is_a_choice() {
+        let alive = |mask, unfinished| {
+            let (data, mut config) = (endings(unfinished), Preset::Paper.config("own", 1.0));
+            config.done_mask = mask;
+            let normaliser = Normaliser::new(&data, false);
+            let source = Source::new(&config, &data, &normaliser);
+            let mut batch: Batch<f64> = source.room(data.len());
+            (0..data.len()).for_each(|row| source.fill(&mut batch, row, row, 0.0));
+            batch.alive
+        };
+        assert_eq!(alive(Mask::Any, Unfinished::Drop), [1.0, 0.0, 1.0, 0.0]);
+        assert_eq!(alive(Mask::Terminal, Unfinished::Drop), [1.0, 0.0, 1.0, 1.0]);
+        assert_eq!(alive(Mask::Any, Unfinished::Keep), [1.0, 0.0, 1.0, 0.0, 1.0, 1.0]);
+    }
+
+    #[test]
+    fn an_unfinished_episode_is_left_out_or_costs_what_it_cost_until_then() {
+        let [dropped, kept] = [Unfinished::Drop, Unfinished::Keep].map(endings);
+        assert_eq!((dropped.trajectories().len(), kept.trajectories().len()), (2, 3));
+        assert_eq!((dropped.after_last_end(), kept.after_last_end()), (2, 2));
+        assert_eq!((kept.ending(5), kept.ending(4)), (Some(Ending::Unfinished), None));
+        assert_eq!((kept.kappa(4), kept.kappa_next(4), kept.kappa_next(5)), (2.0, 1.0, 0.0));
     }
 
     #[test]

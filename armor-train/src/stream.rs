@@ -21,6 +21,16 @@ pub(crate) const BUDGET: u32 = 7;
 pub(crate) const RELABEL: u32 = 8;
 /// Leniency that a sample is cloned under; the tick is the training step.
 pub(crate) const LENIENCY: u32 = 9;
+/// Which twin of a critic is asked, where that is random; the tick is the training step.
+pub(crate) const TWINS: u32 = 15;
+/// Trajectory that a row is drawn from, where rows are drawn so; the tick is the training step.
+pub(crate) const TRAJECTORIES: u32 = 16;
+/// Bin of trajectories that it is drawn from; the tick is the training step.
+pub(crate) const BINS: u32 = 17;
+/// Noise put on recorded rewards; the tick is the row.
+pub(crate) const REWARD_NOISE: u32 = 18;
+/// Recorded costs that are misread; the tick is the row.
+pub(crate) const COST_ERRORS: u32 = 19;
 /// Driving style of a collected trajectory, and its start; the tick is the trajectory.
 pub(crate) const STYLE: u32 = 13;
 /// Noise on collected actions; the tick is the control step.

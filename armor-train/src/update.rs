@@ -28,6 +28,8 @@ pub struct Worker<T: Scalar> {
     pub levels: Vec<usize>,
     /// Noise of behaviour cloning, `A x B`.
     pub cloning: DMatrix<T>,
+    /// Whether the second of the critic's twins judges the actor, where that is random.
+    pub second_twin: bool,
     next_context: Context<T>,
     next_chain: Chain<T>,
     target_tape: CriticTape<T>,
@@ -66,6 +68,7 @@ impl<T: Scalar> Worker<T> {
             batch: Batch::zeros(state, action, samples),
             levels: vec![1; samples],
             cloning: DMatrix::zeros(action, samples),
+            second_twin: false,
             next_context: denoiser.context(samples),
             next_chain: Chain::new(denoiser, model.target_chain.clone(), samples, 0),
             target_tape: model.critic.tape(samples),
@@ -141,7 +144,8 @@ impl<T: Scalar> Worker<T> {
     fn act(&mut self, model: &Model, parameters: &Parameters<T>, batch_len: usize, draw: &Draw<'_, T>) {
         let first = self.first;
         let draw = |stage: usize, sample: usize, out: &mut [T]| draw(stage, first + sample, out);
-        let noise = ActorNoise { levels: &self.levels, cloning: &self.cloning, chain: &draw };
+        let second_twin = self.second_twin;
+        let noise = ActorNoise { levels: &self.levels, cloning: &self.cloning, chain: &draw, second_twin };
         let (judges, batch) = (judges(model, parameters), (&self.batch, batch_len));
         self.actor_loss = model.actor.forward(&parameters.actor, judges, batch, &noise, &mut self.actor_tape);
     }

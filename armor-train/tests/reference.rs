@@ -6,7 +6,7 @@ use armor_core::schedule::{Sampler, Schedule};
 use armor_train::actor::chain::Chain;
 use armor_train::actor::denoiser::{Denoiser, Widths};
 use armor_train::actor::{Actor, CloningNorm, Guidance, PolicyGradient, Process};
-use armor_train::critic::{Critic, Task};
+use armor_train::critic::{Critic, Task, Twins};
 use armor_train::data::{Dataset, Recording};
 use armor_train::dual::{Dual, DualOptions};
 use armor_train::model::{ActorCopy, CriticCopy, Model, Optimisers, Parameters};
@@ -80,6 +80,7 @@ impl Reference {
                 eta: 1.0,
                 guidance: Guidance::Raw,
                 constraint_scale: 1.0,
+                twins: Twins::Pessimistic,
             },
             critic: Critic::new(STATE, ACTION, 12, 10, kappa_scale),
             dual: Dual::new(DualOptions::default(), 9, kappa_scale),
@@ -272,7 +273,8 @@ fn single_steps() -> Dataset {
 fn counterfactual_weights_are_pytorchs() {
     let reference = Reference::read();
     let critic = reference.model(PolicyGradient::Full).critic;
-    let settings = Counterfactual { perturbations: 3, sigma: vec![0.1; ACTION], max: 2.0, ema: 0.3 };
+    let settings =
+        Counterfactual { perturbations: 3, sigma: vec![0.1; ACTION], max: 2.0, ema: 0.3, twins: Twins::Pessimistic };
     let perturbation = reference.numbers("perturbation");
     let draw = |k: usize, sample: usize, out: &mut [f64]| {
         let at = (k * SAMPLES + sample) * ACTION;

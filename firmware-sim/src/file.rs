@@ -6,6 +6,11 @@ use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
+/// Start of the name of a file that is not whole yet.
+const PREFIX: &str = ".armor-";
+/// End of it.
+const SUFFIX: &str = ".part";
+
 /// A file could not be read or written.
 #[derive(Debug, Error)]
 #[error("cannot {action} {}: {source}", path.display())]
@@ -41,12 +46,25 @@ pub fn write_with(path: &Path, contents: impl FnOnce(&mut File) -> io::Result<()
     write_aside(folder, path, contents).map_err(|source| FileError { action: "write", path: path.into(), source })
 }
 
+/// Deletes what an earlier process left of [`write()`] in a folder when it was killed half way.
+///
+/// Nobody else may be writing there. What cannot be deleted stays, and does no harm.
+pub fn sweep(folder: &Path) {
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    for path in entries.map(|entry| entry.path()) {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        if name.starts_with(PREFIX) && name.ends_with(SUFFIX) {
+            let _ = fs::remove_file(&path);
+        }
+    }
+}
+
 fn write_aside(folder: &Path, path: &Path, contents: impl FnOnce(&mut File) -> io::Result<()>) -> io::Result<()> {
     let mut builder = tempfile::Builder::new();
     // As any new file, not for its owner alone; the process's umask still holds.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let mut file = builder.prefix(".").suffix(".part").tempfile_in(folder)?;
+    let mut file = builder.prefix(PREFIX).suffix(SUFFIX).tempfile_in(folder)?;
     contents(file.as_file_mut())?;
     file.as_file().sync_all()?;
     file.persist(path)?;
@@ -75,6 +93,19 @@ mod tests {
         let error = write(&path, b"x").unwrap_err().to_string();
         assert!(error.starts_with("cannot write") && error.contains("taken"), "{error}");
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn only_what_was_left_half_written_is_swept() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in [".armor-x1.part", ".armor-notes", "movie.part", ".other.part", "kept"] {
+            fs::write(folder.path().join(name), "").unwrap();
+        }
+        sweep(folder.path());
+        let mut names: Vec<_> = fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+        names.sort();
+        assert_eq!(names, [".armor-notes", ".other.part", "kept", "movie.part"]);
+        sweep(Path::new("no/such/folder"));
     }
 
     #[test]

@@ -14,7 +14,8 @@ use std::ops::Range;
 use nalgebra::DMatrix;
 
 use crate::nn::{
-    Activation, Linear, Mlp, Operand, Packed, Scalar, Tape, Update, keep_columns, product, scale, sinusoidal_code,
+    Activation, Frequencies, Linear, Mlp, Operand, Packed, Scalar, Tape, Update, keep_columns, product, scale,
+    sinusoidal_code,
 };
 
 /// Widths of the network.
@@ -40,7 +41,8 @@ pub struct Widths {
     pub steps: usize,
 }
 
-/// Layout of the network within its parameters: kappa MLP, time MLP, first layer, body.
+/// Layout of the network within its parameters: kappa MLP, time MLP, first layer, body, and
+/// the frequencies of the step's code where they are learnt.
 #[derive(Clone, Debug)]
 pub struct Denoiser {
     widths: Widths,
@@ -51,6 +53,7 @@ pub struct Denoiser {
     time: Mlp,
     first: Linear,
     body: Mlp,
+    frequencies: Option<Frequencies>,
 }
 
 /// What stays the same along a chain, and the gradients that flow back into it.
@@ -59,6 +62,7 @@ pub struct Context<T: Scalar> {
     kappa_input: DMatrix<T>,
     kappa: Tape<T>,
     time_code: DMatrix<T>,
+    time_code_gradient: DMatrix<T>,
     time: Tape<T>,
     /// `W_s s + W_k e_k + b`, `H x B`.
     constant: DMatrix<T>,
@@ -139,7 +143,13 @@ impl Denoiser {
         let inputs = action + state + kappa_embedding + time_embedding;
         let first = Linear { inputs, outputs: hidden, offset: time.end() };
         let body = Mlp::new(&[hidden, hidden, hidden, action], first.end(), Activation::Mish, None);
-        Self { widths, kappa_scale, sees_action: true, kappa, time, first, body }
+        Self { widths, kappa_scale, sees_action: true, kappa, time, first, body, frequencies: None }
+    }
+
+    /// The same layout with frequencies of the step's code that are learnt (O-9).
+    pub fn with_learned_frequencies(self) -> Self {
+        let frequencies = Frequencies { count: self.widths.time_code / 2, offset: self.body.end() };
+        Self { frequencies: Some(frequencies), ..self }
     }
 
     /// The same layout for a network that does not see the noisy action, `W_a = 0` for good.
@@ -174,7 +184,7 @@ impl Denoiser {
 
     /// Numbers of the network.
     pub fn size(&self) -> usize {
-        self.body.end()
+        self.frequencies.as_ref().map_or(self.body.end(), Frequencies::end)
     }
 
     /// Inputs of the first layer that are the noisy action, the state, the kappa and the time embedding.
@@ -197,6 +207,9 @@ impl Denoiser {
             parameters[self.first.offset..][..of_action.len() * self.first.outputs].fill(T::zero());
         }
         self.body.initialise(parameters, draws);
+        if let Some(frequencies) = &self.frequencies {
+            frequencies.initialise(parameters, draws);
+        }
     }
 
     /// Room for the context of `samples` columns.
@@ -206,6 +219,7 @@ impl Denoiser {
             kappa_input: DMatrix::zeros(1, samples),
             kappa: self.kappa.tape(samples),
             time_code: sinusoidal_code(time_code, steps),
+            time_code_gradient: DMatrix::zeros(time_code, steps),
             time: self.time.tape(steps),
             constant: DMatrix::zeros(hidden, samples),
             constant_gradient: DMatrix::zeros(hidden, samples),
@@ -239,6 +253,9 @@ impl Denoiser {
             *input = scale * kappa;
         }
         self.kappa.forward(parameters, &context.kappa_input, &mut context.kappa, true);
+        if let Some(frequencies) = &self.frequencies {
+            frequencies.code(parameters, &mut context.time_code);
+        }
         self.time.forward(parameters, &context.time_code, &mut context.time, true);
 
         let [_, of_state, of_kappa, of_time] = self.blocks();
@@ -316,7 +333,9 @@ impl Denoiser {
         gradient: &mut [T],
     ) {
         let [_, of_state, of_kappa, of_time] = self.blocks();
-        let Context { kappa_input, kappa, time_code, time, constant_gradient, table_gradient, .. } = context;
+        let Context {
+            kappa_input, kappa, time_code, time_code_gradient, time, constant_gradient, table_gradient, ..
+        } = context;
         let delta = Operand::from(&*constant_gradient);
         self.first.add_block_gradient(gradient, of_state, delta, state.into());
         self.first.add_block_gradient(gradient, of_kappa.clone(), delta, kappa.output().into());
@@ -330,7 +349,13 @@ impl Denoiser {
         back(of_kappa, constant_gradient, kappa);
         self.kappa.backward(parameters, kappa_input, kappa, Some(gradient), None);
         back(of_time, table_gradient, time);
-        self.time.backward(parameters, time_code, time, Some(gradient), None);
+        match &self.frequencies {
+            None => self.time.backward(parameters, time_code, time, Some(gradient), None),
+            Some(frequencies) => {
+                self.time.backward(parameters, time_code, time, Some(gradient), Some(time_code_gradient));
+                frequencies.add_gradient(time_code, time_code_gradient, gradient);
+            }
+        }
     }
 
     /// The time table, `H x N`, as an image stores it.

@@ -15,7 +15,7 @@ use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
 use crate::batch::Batch;
-use crate::critic::{Critic, CriticTape, Task};
+use crate::critic::{Critic, CriticTape, Pick, Task, Twins};
 use crate::dual::{Dual, DualTape};
 use crate::nn::Scalar;
 use chain::{Chain, Draw, clip, coefficients};
@@ -55,6 +55,8 @@ pub struct Actor {
     pub guidance: Guidance,
     /// Factor on the violation of the constraint; 1 in the paper.
     pub constraint_scale: f64,
+    /// Which of the critic's twins judge the actor.
+    pub twins: Twins,
 }
 
 /// What an update of the actor and the dual needs, for a share of the batch.
@@ -66,6 +68,7 @@ pub struct ActorTape<T: Scalar> {
     /// Whether the one-step estimate lay within the bounds, `A x B`.
     inside: DMatrix<T>,
     critic: CriticTape<T>,
+    pick: Pick,
     dual: DualTape<T>,
     /// The policy's actions `a_pi`, `A x B`.
     pub action: DMatrix<T>,
@@ -127,6 +130,8 @@ pub struct ActorNoise<'a, T: Scalar> {
     pub cloning: &'a DMatrix<T>,
     /// Draws of the chain behind `a_pi`.
     pub chain: &'a Draw<'a, T>,
+    /// Whether the second of the critic's twins is drawn, where that is random.
+    pub second_twin: bool,
 }
 
 /// The networks that judge the actor, frozen during its update.
@@ -141,7 +146,7 @@ pub struct Judges<'a, T: Scalar> {
 impl<T: Scalar> ActorTape<T> {
     /// `Q_r` or `Q_cL` at the policy's actions.
     pub(crate) fn values(&self, task: Task) -> impl Iterator<Item = T> {
-        self.critic.pessimistic(task)
+        self.critic.values(task, self.pick)
     }
 }
 
@@ -165,6 +170,7 @@ impl Actor {
             chain: Chain::new(&self.denoiser, steps, samples, gradient_steps),
             inside: action(),
             critic: critic.tape(samples),
+            pick: Pick::PESSIMISTIC,
             dual: dual.tape(samples),
             action: action(),
             violation: vec![T::zero(); samples],
@@ -191,15 +197,16 @@ impl Actor {
         let tasks = [Task::Reward, Task::LongCost];
         let at_policy = (&batch.state, &batch.kappa[..], &tape.action);
         critic.forward(critic_parameters, &tasks, at_policy, &mut tape.critic, true);
+        tape.pick = Pick { twins: self.twins, second: noise.second_twin };
         let scale = T::of(self.constraint_scale);
-        let pairs = tape.critic.pessimistic(Task::LongCost).zip(&batch.threshold);
+        let pairs = tape.critic.values(Task::LongCost, tape.pick).zip(&batch.threshold);
         for (violation, (q, &threshold)) in tape.violation.iter_mut().zip(pairs) {
             *violation = scale * (q - threshold);
         }
         let (dual, dual_parameters) = judges.dual;
         dual.forward(dual_parameters, &batch.kappa, &mut tape.dual);
 
-        let values = |task| tape.critic.pessimistic(task).map(T::to_f64);
+        let values = |task| tape.values(task).map(T::to_f64);
         let lambda = || tape.dual.lambda.iter().map(|lambda| lambda.to_f64());
         ActorLoss {
             cloning,
@@ -230,7 +237,7 @@ impl Actor {
         let reward_slope = vec![-T::of(guidance) * share; batch.samples()];
         let cost_slope: Vec<T> = tape.dual.lambda.iter().map(|&lambda| lambda * scale * share).collect();
         let slopes = [(Task::Reward, &reward_slope[..]), (Task::LongCost, &cost_slope[..])];
-        critic.action_gradient(critic_parameters, &slopes, &mut tape.critic, &mut tape.action_gradient);
+        critic.action_gradient(critic_parameters, (&slopes, tape.pick), &mut tape.critic, &mut tape.action_gradient);
 
         self.improve(parameters, tape, gradient);
         self.denoiser.backward(parameters, &mut tape.context, &mut tape.call, gradient);

@@ -59,6 +59,7 @@ fn fixture(policy_gradient: PolicyGradient) -> Fixture {
             eta: 0.7,
             guidance: Guidance::Raw,
             constraint_scale: 0.6,
+            twins: Twins::Pessimistic,
         },
         critic,
         dual,
@@ -88,7 +89,7 @@ impl Fixture {
         let mut dual_gradient = vec![0.0; self.dual_parameters.len()];
         let judges =
             Judges { critic: (&self.critic, &self.critic_parameters), dual: (&self.dual, &self.dual_parameters) };
-        let noise = ActorNoise { levels: &self.levels, cloning: &self.cloning, chain: &draw };
+        let noise = ActorNoise { levels: &self.levels, cloning: &self.cloning, chain: &draw, second_twin: true };
         let batch = (&self.batch, SAMPLES);
         let loss = self.actor.forward(parameters, judges, batch, &noise, &mut tape);
         let gradients = (&mut gradient[..], &mut dual_gradient[..]);
@@ -115,6 +116,28 @@ fn the_gradient_through_the_full_chain_and_its_clips_is_that_of_finite_differenc
 #[test]
 fn the_one_step_gradient_is_that_of_finite_differences() {
     fixture(PolicyGradient::OneStep).check();
+}
+
+#[test]
+fn the_gradient_under_other_twins_is_that_of_finite_differences() {
+    for twins in [Twins::Minimum, Twins::Mean, Twins::Random] {
+        let mut f = fixture(PolicyGradient::OneStep);
+        f.actor.twins = twins;
+        f.check();
+    }
+}
+
+#[test]
+fn the_gradient_with_learnt_frequencies_is_that_of_finite_differences() {
+    for policy_gradient in [PolicyGradient::Full, PolicyGradient::OneStep] {
+        let mut f = fixture(policy_gradient);
+        f.actor.denoiser = Denoiser::new(WIDTHS, 0.5).with_learned_frequencies();
+        f.parameters = fill(f.actor.denoiser.size(), 1);
+        // Slow enough that the steps of finite differences are small against a turn at level 20.
+        let frequencies = f.parameters.len() - WIDTHS.time_code / 2;
+        f.parameters[frequencies..].iter_mut().for_each(|frequency| *frequency *= 0.02);
+        f.check();
+    }
 }
 
 #[test]

@@ -10,7 +10,7 @@ use firmware_sim::task::Task;
 
 use crate::collect::collect;
 use crate::config::Preset;
-use crate::data::{self, Dataset, Stats};
+use crate::data::{self, Dataset, Stats, Unfinished};
 
 /// Look at recorded data.
 #[derive(Debug, clap::Subcommand)]
@@ -63,14 +63,18 @@ impl Data {
     pub(super) fn run(self, output: Output) -> CommandResult {
         match self {
             Self::Stats { file, limit, beta } => {
-                let data = read(&file, output)?;
+                let data = read(&file, Unfinished::Drop, output)?;
                 output.report(&Stats::new(&data, limit, beta))
             }
             Self::Collect { task, out, trajectories, seed } => {
                 let recording = collect(task, trajectories, seed)?;
                 file::write(&out, &data::to_hdf5(&recording)?)?;
                 let beta = Preset::Paper.config("", 0.0).beta;
-                output.report(&Stats::new(&read(&out, output)?, CostLimit::new(task.cost_limit)?, beta))
+                output.report(&Stats::new(
+                    &read(&out, Unfinished::Drop, output)?,
+                    CostLimit::new(task.cost_limit)?,
+                    beta,
+                ))
             }
             Self::Check { file } => {
                 let report = data::check(&file);
@@ -82,7 +86,7 @@ impl Data {
                         .into())
                 }
             }
-            Self::Calibrate { file, task } => output.report(&calibrate(&read(&file, output)?, task)?),
+            Self::Calibrate { file, task } => output.report(&calibrate(&read(&file, Unfinished::Drop, output)?, task)?),
         }
     }
 }
@@ -98,8 +102,8 @@ fn trajectories(text: &str) -> Result<usize, &'static str> {
 }
 
 /// Reads a file, and tells what is odd about it.
-pub(super) fn read(file: &Path, output: Output) -> Result<Dataset, data::DataError> {
-    let data = Dataset::read(file)?;
+pub(super) fn read(file: &Path, unfinished: Unfinished, output: Output) -> Result<Dataset, data::DataError> {
+    let data = Dataset::read_with(file, unfinished)?;
     for warning in data::Warning::all(&data, file) {
         output.note(format_args!("warning: {warning}"));
     }

@@ -9,6 +9,7 @@ use firmware_sim::file;
 use serde::Serialize;
 
 use super::progress::Progress;
+use crate::config::options::listing;
 use crate::config::{Config, ConfigError, Given, Preset};
 use crate::data::Dataset;
 use crate::run::{self, Checkpoint, Outcome, RunError};
@@ -24,6 +25,7 @@ use crate::run::{self, Checkpoint, Outcome, RunError};
 /// key, docs/metrics.md the columns of metrics.csv; `armor-train report` draws
 /// them.
 #[derive(Debug, clap::Args)]
+#[command(after_long_help = format!("Options of --set and --config:\n\n{}", listing()))]
 pub(super) struct Fit {
     /// An HDF5 file in the DSRL layout.
     #[arg(long, value_name = "H5")]
@@ -68,7 +70,7 @@ impl Fit {
     pub(super) fn run(self, output: Output) -> CommandResult {
         let file = self.config.as_deref().map(|path| file::read(path).map(|bytes| (path, bytes))).transpose()?;
         let mut config = self.config(file).unwrap_or_else(|error| super::misuse(&error));
-        let data = super::data::read(Path::new(&config.data), output)?;
+        let data = super::data::read(Path::new(&config.data), config.unfinished, output)?;
         config.data = absolute(Path::new(&config.data));
         let started = std::time::Instant::now();
         let outcome = train("training", &config, &data, &self.out, self.resume, output)?;

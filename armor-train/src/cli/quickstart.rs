@@ -19,7 +19,7 @@ use serde::Serialize;
 
 use super::fit::{absolute, train};
 use crate::config::Preset;
-use crate::data::{Dataset, Stats};
+use crate::data::{Dataset, Stats, Unfinished};
 use crate::export::{Agreement, export};
 use crate::run::{Checkpoint, Outcome};
 
@@ -86,7 +86,7 @@ impl Quickstart {
         let limit = CostLimit::new(task.cost_limit)?;
 
         output.note("recorded data (recorded for this project, DSRL layout)");
-        let data = super::data::read(&self.data, output)?;
+        let data = super::data::read(&self.data, Unfinished::Drop, output)?;
         let stats = Stats::new(&data, limit, Preset::Quick.config(TASK, 0.0).beta);
         output.note(format_args!("{stats}\n"));
         let plant = super::data::calibrate(&data, task)?;

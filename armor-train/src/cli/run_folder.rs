@@ -30,7 +30,7 @@ pub(super) fn checkpoint_and_data(
 ) -> Result<(Checkpoint, Dataset), Box<dyn std::error::Error>> {
     let checkpoint = Checkpoint::read(folder)?;
     let path = data.cloned().unwrap_or_else(|| PathBuf::from(&checkpoint.config.data));
-    let data = super::data::read(&path, output)
+    let data = super::data::read(&path, checkpoint.config.unfinished, output)
         .map_err(|error| format!("{error}; name the run's recorded data with --data if it was moved"))?;
     same_data(&checkpoint, &data, folder)?;
     Ok((checkpoint, data))

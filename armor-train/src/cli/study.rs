@@ -65,12 +65,17 @@ impl Study {
         let (file, text) = self.definition().unwrap_or_else(|error| super::misuse(&error));
         let study = Definition::parse(&file, &text)?;
         let runs = study.runs(&absolute(&self.data))?;
-        let data = super::data::read(&self.data, output)?;
+        let mut data: Option<Dataset> = None;
         let flyer = Flyer::of(Task::named(&study.task)?, output)?;
         let mut rows: Vec<Row> = Vec::new();
         for (index, run) in runs.iter().enumerate() {
             let label = format!("{}/{} {}", index + 1, runs.len(), run.folder.display());
-            let score = self.score((&study, &flyer), run, &label, &data, output)?;
+            data.take_if(|data| data.unfinished() != run.config.unfinished);
+            let data = match &mut data {
+                Some(data) => data,
+                none => none.insert(super::data::read(&self.data, run.config.unfinished, output)?),
+            };
+            let score = self.score((&study, &flyer), run, &label, data, output)?;
             match rows.last_mut().filter(|row| row.variant == run.variant) {
                 Some(row) => row.scores.push(score),
                 None => rows.push(Row { variant: run.variant.clone(), scores: vec![score] }),

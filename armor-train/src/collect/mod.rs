@@ -1,90 +1,83 @@
 //! Recordings of mixed quality from native plants: a sweep of driving styles with
 //! noise on the actions, thinned towards the statistics of the paper's Table 1.
 
-mod style;
+mod campaign;
 mod thin;
 
 use armor_core::noise::{Noise, uniform};
-use firmware_sim::plant::Plant;
+use firmware_sim::plant::{Plant, Style};
 use firmware_sim::task::{Task, TaskError};
+use rayon::prelude::*;
 
 use crate::data::Recording;
 use crate::stream;
 
-pub use style::{CAMPAIGNS, Campaign, Style};
+pub use campaign::{CAMPAIGNS, Campaign, Shares};
 
 /// Trajectories driven for each one kept, so that thinning has a choice.
 const CHOICE: usize = 4;
 
-/// Why nothing can be recorded.
-#[derive(Debug, thiserror::Error)]
-pub enum CollectError {
-    /// The task has no plant here.
-    #[error(transparent)]
-    Task(#[from] TaskError),
-    /// No driving styles are known for the task.
-    #[error("no driving styles are known for {task}; they are for {}", known())]
-    NoStyles {
-        /// The task.
-        task: &'static str,
-    },
-}
-
-fn known() -> String {
-    CAMPAIGNS.iter().map(|campaign| campaign.task).collect::<Vec<_>>().join(", ")
-}
-
 /// Drives a task's campaign and keeps `trajectories` of it (the campaign's own number, if `None`).
 ///
-/// The same seed records the same bits.
+/// The same seed records the same bits, whatever the number of threads.
 ///
 /// # Errors
-/// [`CollectError`]
-pub fn collect(task: &'static Task, trajectories: Option<usize>, seed: u64) -> Result<Recording, CollectError> {
-    let mut plant = task.plant()?;
-    let campaign = CAMPAIGNS
-        .iter()
-        .find(|campaign| campaign.task == task.name)
-        .ok_or(CollectError::NoStyles { task: task.name })?;
+/// [`TaskError::NotNative`]
+pub fn collect(task: &'static Task, trajectories: Option<usize>, seed: u64) -> Result<Recording, TaskError> {
+    let campaign = CAMPAIGNS.iter().find(|campaign| campaign.task == task.name);
+    let campaign = campaign.ok_or(TaskError::NotNative { task: task.name })?;
     let wanted = trajectories.unwrap_or(campaign.trajectories);
     let noise = Noise::new(seed);
-    let driven: Vec<Recording> =
-        (0..CHOICE * wanted).map(|index| drive(task, campaign, plant.as_mut(), noise, index as u64)).collect();
-    let costs: Vec<f64> = driven.iter().map(|one| one.costs.iter().map(|&cost| f64::from(cost)).sum()).collect();
-    let steps = driven.iter().map(|one| one.costs.len()).sum::<usize>() as f64 / driven.len().max(1) as f64;
-    let target = thin::Target {
-        count: wanted,
-        limit: f64::from(task.cost_limit),
-        p_feas: campaign.p_feas,
-        mean_cost: campaign.p_nz * steps,
+    let drive = |index: usize| Ok(drive(task, campaign, task.plant()?.as_mut(), noise, index as u64));
+    let kept = match campaign.table_1 {
+        None => (0..wanted).collect(),
+        Some(shares) => {
+            // Only what a choice needs is kept: all of them would be several times the recording.
+            let outcome = |index| drive(index).map(|one: Recording| (total(&one.costs), one.costs.len()));
+            let driven = (0..CHOICE * wanted).into_par_iter().map(outcome).collect::<Result<Vec<_>, TaskError>>()?;
+            let steps = driven.iter().map(|(_, steps)| steps).sum::<usize>() as f64 / driven.len().max(1) as f64;
+            let costs: Vec<f64> = driven.into_iter().map(|(cost, _)| cost).collect();
+            let target = thin::Target {
+                count: wanted,
+                limit: f64::from(task.cost_limit),
+                p_feas: shares.p_feas,
+                mean_cost: shares.p_nz * steps,
+            };
+            thin::choose(&costs, &target)
+        }
     };
-    let kept = thin::choose(&costs, &target);
     let mut all = Recording { state_dim: task.state, action_dim: task.action, ..Recording::default() };
-    for index in kept {
-        all.append(&driven[index]);
+    for one in kept.into_par_iter().map(drive).collect::<Result<Vec<_>, TaskError>>()? {
+        all.append(&one);
     }
     Ok(all)
 }
 
+fn total(costs: &[f32]) -> f64 {
+    costs.iter().map(|&cost| f64::from(cost)).sum()
+}
+
 /// One trajectory of a style of its own.
 fn drive(task: &Task, campaign: &Campaign, plant: &mut dyn Plant, noise: Noise, index: u64) -> Recording {
-    let [speed, margin, spread, low] = noise.words(stream::STYLE, index, 0);
     let within =
         |range: &std::ops::Range<f64>, word| range.start + (range.end - range.start) * f64::from(uniform(word));
+    let [pace, margin, spread, low] = noise.words(stream::STYLE, index, 0);
+    let [look, ..] = noise.words(stream::STYLE, index, 1);
     let style = Style {
-        speed: within(&campaign.speed, speed),
+        pace: within(&campaign.pace, pace),
         margin: within(&campaign.margin, margin),
-        noise: within(&campaign.noise, spread),
+        look: within(&campaign.look, look),
     };
+    let spread = within(&campaign.noise, spread) as f32;
     plant.reset(index << 32 | u64::from(low));
     let mut one = Recording { state_dim: task.state, action_dim: task.action, ..Recording::default() };
     let (mut state, mut action, mut draws) = (vec![0.0; task.state], vec![0.0; task.action], vec![0.0f32; task.action]);
     plant.observe(&mut state);
     for step in 0..task.horizon {
-        (campaign.drive)(style, &state, &mut action);
+        plant.pilot(&style, &mut action);
         stream::fill_normal(noise, stream::DRIVING, index * task.horizon as u64 + step as u64, &mut draws);
         for (action, draw) in action.iter_mut().zip(&draws) {
-            *action = (*action + style.noise as f32 * draw).clamp(-1.0, 1.0);
+            *action = (*action + spread * draw).clamp(-1.0, 1.0);
         }
         one.observations.extend_from_slice(&state);
         let outcome = plant.step(&action);
@@ -109,15 +102,37 @@ mod tests {
     use super::*;
     use crate::data::{Dataset, Stats};
 
+    /// The statistics of so many trajectories.
+    fn stats(task: &str, trajectories: Option<usize>) -> Stats {
+        let task = Task::named(task).unwrap();
+        let data = Dataset::new(collect(task, trajectories, 0).unwrap()).unwrap();
+        assert_eq!(data.gaps().count(), 0, "every next observation is the one that follows");
+        Stats::new(&data, CostLimit::new(task.cost_limit).unwrap(), 0.5)
+    }
+
     #[test]
     fn ball_run_is_recorded_with_the_statistics_of_table_1() {
-        let task = Task::named("ball-run").unwrap();
-        let data = Dataset::new(collect(task, None, 0).unwrap()).unwrap();
-        let stats = Stats::new(&data, CostLimit::new(task.cost_limit).unwrap(), 0.5);
+        let stats = stats("ball-run", None);
         assert_eq!((stats.transitions, stats.trajectories), (94_000, 940));
         assert!((stats.p_nz - 0.4868).abs() < 0.005, "{}", stats.p_nz);
         assert!((stats.p_feas - 0.0447).abs() < 0.001, "{}", stats.p_feas);
-        assert_eq!(data.gaps().count(), 0, "every next observation is the one that follows");
+    }
+
+    /// A share of so few trajectories is met to the nearest one.
+    #[test]
+    fn the_point_robot_is_recorded_with_the_statistics_of_table_1() {
+        for (task, p_nz, p_feas) in [("point-circle", 0.2262, 0.1257), ("point-goal", 0.0307, 0.4525)] {
+            let stats = stats(task, Some(60));
+            assert!((stats.p_nz - p_nz).abs() < 0.01, "{task}: {}", stats.p_nz);
+            assert!((stats.p_feas - p_feas).abs() < 0.01, "{task}: {}", stats.p_feas);
+        }
+    }
+
+    #[test]
+    fn ball_circle_is_recorded_with_good_and_bad_drivers() {
+        let stats = stats("ball-circle", Some(60));
+        assert!(stats.p_feas > 0.1 && stats.p_feas < 0.9, "{}", stats.p_feas);
+        assert!(stats.reward_return_max > 2.0 * stats.reward_return_p5.max(1.0), "{stats}");
     }
 
     #[test]
@@ -129,9 +144,10 @@ mod tests {
     }
 
     #[test]
-    fn a_task_without_plant_or_styles_is_refused() {
-        let error = |task: &str| collect(Task::named(task).unwrap(), Some(1), 0).unwrap_err().to_string();
-        assert!(error("SafetyAntRun-v0").contains("needs its simulator"));
-        assert!(error("ball-circle").contains("no driving styles are known for ball-circle; they are for ball-run"));
+    fn every_native_task_has_a_campaign_and_another_one_is_refused() {
+        let native = firmware_sim::task::TASKS.iter().filter(|task| task.plant().is_ok());
+        assert!(native.map(|task| task.name).eq(CAMPAIGNS.iter().map(|campaign| campaign.task)));
+        let error = collect(Task::named("SafetyAntRun-v0").unwrap(), Some(1), 0).unwrap_err().to_string();
+        assert!(error.contains("needs its simulator"), "{error}");
     }
 }

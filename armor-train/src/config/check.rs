@@ -4,10 +4,12 @@ use armor_core::schedule::MAX_STEPS;
 
 use super::{Config, ConfigError};
 use crate::actor::{Family, PolicyGradient};
+use crate::critic::Twins;
 use crate::critic::bootstrap::Bootstrap;
 use crate::extraction::Extraction;
 use crate::extraction::condition::Condition;
 use crate::model::ActorCopy;
+use crate::reweight::{Averaged, WeightMean};
 
 impl Config {
     /// Whether every option lies in its range.
@@ -50,6 +52,7 @@ impl Config {
             ("relabel_share", self.relabel_share),
             ("final_rate", self.final_rate),
             ("advantage_decay", self.advantage_decay),
+            ("cost_errors", self.cost_errors),
         ];
         for (key, value) in shares {
             require(key, (0.0..=1.0).contains(&value), "between 0 and 1")?;
@@ -63,6 +66,8 @@ impl Config {
             ("temperature", self.temperature),
             ("gaussian_std", self.gaussian_std),
             ("gradient_clip", self.gradient_clip),
+            ("weight_decay", self.weight_decay),
+            ("reward_noise", self.reward_noise),
             ("advantage_temperature", self.advantage_temperature),
             ("advantage_lambda", self.advantage_lambda),
             ("advantage_cap", self.advantage_cap),
@@ -101,6 +106,12 @@ impl Config {
         require("time_code", is_code, "even and between 4 and 1024")?;
         let averages = self.actor_average > 0.0 || self.target_actor == ActorCopy::Live;
         require("actor_average", averages, "above 0 where target_actor is average")?;
+        let by_batch = self.weight_mean == WeightMean::Batch;
+        require("weight_mean", !by_batch || !weighted, "data where extraction is weighted")?;
+        let averages_cf = self.reweight_averaged == Averaged::Counterfactual;
+        require("weight_mean", !by_batch || averages_cf, "data where reweight_averaged is weight")?;
+        let twins = self.counterfactual_twins;
+        require("counterfactual_twins", twins != Twins::Random, "pessimistic, minimum or mean")?;
         require("refresh_share", self.refresh_share > 0.0 && self.refresh_share <= 1.0, "above 0 and at most 1")?;
         let is_gaussian = self.policy == Family::Gaussian;
         require("diffusion_steps", !is_gaussian || self.diffusion_steps == 1, "1 where policy is gaussian")?;
@@ -158,6 +169,9 @@ mod tests {
             "weight_max=0.1",
             "eta=nan",
             "head_layers=0",
+            "cost_errors=1.5",
+            "weight_decay=-1",
+            "counterfactual_twins=random",
         ] {
             let mut config = Preset::Paper.config("ball-run", 5.0);
             config.set(bad).unwrap();

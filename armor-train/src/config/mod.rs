@@ -5,6 +5,7 @@ mod check;
 mod given;
 pub mod options;
 mod preset;
+mod resolve;
 
 use std::path::PathBuf;
 
@@ -13,19 +14,24 @@ use serde::{Deserialize, Serialize};
 
 use crate::actor::{CloningNorm, Family, Guidance, PolicyGradient, ReverseVariance};
 use crate::critic::bootstrap::Bootstrap;
-use crate::critic::{CostHeads, CostOutput, Trunk, TwinLoss};
+use crate::critic::{CostHeads, CostOutput, Trunk, TwinLoss, Twins};
+use crate::data::{Mask, Unfinished};
 use crate::dual::DualClip;
 use crate::extraction::condition::{Condition, LambdaRange};
 use crate::extraction::trace::Trace;
 use crate::extraction::{Advantage, Extraction};
 use crate::model::{ActorCopy, CriticCopy};
+use crate::nn::TimeFrequencies;
 use crate::pcgrad::{Order, Pooling};
 use crate::reweight::reference::Reference;
-use crate::reweight::{MarginMean, Scales};
+use crate::reweight::{Averaged, MarginMean, Scales, WeightMean};
+use crate::sampling::Sampling;
+use crate::selection::Choice;
 use crate::threshold::Threshold;
 
 pub use given::Given;
 pub use preset::Preset;
+pub use resolve::{KappaUnit, RewardUnit};
 
 /// The effective configuration of a run; it is saved as `config.toml` in the run's folder.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -45,15 +51,31 @@ pub struct Config {
     pub steps: u64,
     /// Transitions of a training step (Table 2).
     pub batch: usize,
+    /// What a batch is drawn from (O-31).
+    pub sampling: Sampling,
+    /// Which actor of the run flies (O-24).
+    pub selection: Choice,
 
+    /// What becomes of the rows after the last end mark (O-1).
+    pub unfinished: Unfinished,
+    /// Which last steps of an episode are not followed by any value (O-3).
+    pub done_mask: Mask,
+    /// What decides `reward_scale` (O-4).
+    pub reward_unit: RewardUnit,
     /// Factor on recorded rewards (O-4).
     pub reward_scale: f64,
     /// Factor on recorded costs and on kappa (O-4).
     pub cost_scale: f64,
+    /// What decides `kappa_scale` (O-8).
+    pub kappa_unit: KappaUnit,
     /// Factor on kappa where it enters a network (O-8).
     pub kappa_scale: f64,
     /// Whether the networks see states with mean 0 and variance 1 (O-5).
     pub normalize_states: bool,
+    /// Noise on recorded rewards, in their standard deviations; 0, none, in the paper.
+    pub reward_noise: f64,
+    /// Share of recorded costs that are misread; 0, none, in the paper.
+    pub cost_errors: f64,
 
     /// What the policy's distribution is; a diffusion in the paper (section 4.5).
     pub policy: Family,
@@ -73,6 +95,8 @@ pub struct Config {
     pub kappa_hidden: usize,
     /// Entries of the kappa embedding (O-8).
     pub kappa_embedding: usize,
+    /// What the frequencies of a step's code are (O-9).
+    pub time_frequencies: TimeFrequencies,
     /// Entries of the sinusoidal code of a step (O-9).
     pub time_code: usize,
     /// Hidden units of the time embedding (O-9).
@@ -185,6 +209,8 @@ pub struct Config {
     pub final_rate: f64,
     /// Largest Euclidean norm of a network's gradient; 0, no limit, in the paper (O-30).
     pub gradient_clip: f64,
+    /// Decoupled weight decay of actor and critics; 0, none, in the paper (O-30).
+    pub weight_decay: f64,
     /// Decay of a moving average of the actor's weights, which is exported in
     /// their place; 0, none, in the paper (O-10).
     pub actor_average: f64,
@@ -192,6 +218,8 @@ pub struct Config {
     pub target_actor: ActorCopy,
     /// The critic that judges the policy's actions (Eq. 15, O-15).
     pub policy_critic: CriticCopy,
+    /// Which of its twins (Eq. 15, O-15).
+    pub policy_twins: Twins,
 
     /// Which scales of reweighting are on (section 4.5).
     pub reweight: Scales,
@@ -201,7 +229,9 @@ pub struct Config {
     pub reweight_interval: u64,
     /// Share of the transitions that a refresh looks at (O-18).
     pub refresh_share: f64,
-    /// Share of the new value in the moving average of counterfactual weights (Table 2, O-21).
+    /// What the moving average over refreshes is of (O-21).
+    pub reweight_averaged: Averaged,
+    /// Share of the new value in that moving average (Table 2, O-21).
     pub reweight_ema: f64,
     /// Trajectory weight control coefficient, beta (Eq. 6, Table 2).
     pub beta: f64,
@@ -220,8 +250,12 @@ pub struct Config {
     pub counterfactual_tolerance: f64,
     /// The critic of Eq. 8 (O-19).
     pub counterfactual_critic: CriticCopy,
+    /// Which of its twins (O-19).
+    pub counterfactual_twins: Twins,
     /// Over what the margins of Eq. 9 have their mean (O-22).
     pub margin_mean: MarginMean,
+    /// Over what the weights of Eq. 10 have their mean (O-22).
+    pub weight_mean: WeightMean,
     /// Smallest weight, `w_min` (Eq. 10, Table 2).
     pub weight_min: f64,
     /// Largest weight, `w_max` (Eqs. 9 and 10, Table 2).

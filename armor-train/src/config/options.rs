@@ -23,14 +23,38 @@ pub const OPTIONS: [(&str, &[Entry]); 6] = [
             ),
             ("seed", "seed of everything random; given by --seed"),
             ("steps", "training steps (Table 2); given by --steps"),
-            ("batch", "transitions of a training step, drawn uniformly with replacement (Table 2)"),
+            ("batch", "transitions of a training step, drawn with replacement (Table 2)"),
+            (
+                "sampling",
+                "what is drawn with equal chances: a transition, `uniform`; a `trajectory` and then a transition of it; or one of ten bins of cost return, `cost_bins`, then a trajectory and a transition of it (O-31)",
+            ),
+            (
+                "selection",
+                "the actor that flies: the `last` one, or the one after the 500 steps with the smallest mean `cloning_loss`, counted once the weights are in use; no simulator is asked (O-24)",
+            ),
         ],
     ),
     (
         "Data",
         &[
+            (
+                "unfinished",
+                "rows after the last end mark: `drop`, or `keep` them as an episode that costs what it cost until then (O-1)",
+            ),
+            (
+                "done_mask",
+                "last steps that no value follows (Eq. 3): `any`, by the task's rule or by the time limit, or `terminal`, by the task's rule alone (O-3)",
+            ),
+            (
+                "reward_unit",
+                "what decides reward_scale: it is `given`, or it becomes T / (R_max - R_min) of the data's returns, `return_range`, as in FISOR (O-4)",
+            ),
             ("reward_scale", "factor on recorded rewards; 0.1 is what public code for these tasks takes (O-4)"),
             ("cost_scale", "factor on recorded costs and on kappa (O-4)"),
+            (
+                "kappa_unit",
+                "what decides kappa_scale: it is `given`, or it becomes 1 over the cost `limit`, or over the `largest` kappa of the data (O-8)",
+            ),
             (
                 "kappa_scale",
                 "factor on kappa where it enters a network; 1 over the cost limit or over the largest kappa brings the input near 1 (O-8)",
@@ -38,6 +62,14 @@ pub const OPTIONS: [(&str, &[Entry]); 6] = [
             (
                 "normalize_states",
                 "whether the networks see states with mean 0 and variance 1; the image carries the constants (O-5)",
+            ),
+            (
+                "reward_noise",
+                "standard deviation of noise put on the recorded rewards, in their standard deviations; a study of sensors that are not accurate (section 5)",
+            ),
+            (
+                "cost_errors",
+                "share of steps whose recorded cost is misread, missed or seen where there is none; the same study",
             ),
         ],
     ),
@@ -62,6 +94,10 @@ pub const OPTIONS: [(&str, &[Entry]); 6] = [
             ("hidden", "units of the denoiser's three hidden layers (Appendix B)"),
             ("kappa_hidden", "hidden units of the kappa embedding, whose width the paper leaves open (O-8)"),
             ("kappa_embedding", "entries of the kappa embedding (O-8)"),
+            (
+                "time_frequencies",
+                "frequencies of that code: `geometric`, over four decades, or `learned` Fourier features, as in FISOR (O-9)",
+            ),
             ("time_code", "entries of the sinusoidal code of a denoising step; even (O-9)"),
             ("time_hidden", "hidden units of the time embedding (O-9)"),
             ("time_embedding", "entries of the time embedding (O-9)"),
@@ -151,6 +187,10 @@ pub const OPTIONS: [(&str, &[Entry]); 6] = [
             ("final_rate", "learning rates at the last step as a share of the first, along half a cosine (O-30)"),
             ("gradient_clip", "largest Euclidean norm of a network's gradient; 0 is no limit (O-30)"),
             (
+                "weight_decay",
+                "decoupled decay of the weights of actor and critics, times their learning rates, as in AdamW; 0 is none (O-30)",
+            ),
+            (
                 "actor_average",
                 "decay of a moving average of the actor's weights, which is exported in their place; 0 is none (O-10)",
             ),
@@ -159,6 +199,10 @@ pub const OPTIONS: [(&str, &[Entry]); 6] = [
                 "the actor that takes the next action of the targets (Eq. 3): `live`, or `average`, the moving average where one is kept (O-10)",
             ),
             ("policy_critic", "the critic that judges the policy's actions (Eq. 15): `live` or `target` (O-15)"),
+            (
+                "policy_twins",
+                "which of its twins: `pessimistic`, the smaller reward and the larger cost; `minimum`, the smaller one of both, as CCAC; their `mean`; or a `random` one each step, as Diffusion-QL (O-15)",
+            ),
         ],
     ),
     (
@@ -220,7 +264,11 @@ pub const OPTIONS: [(&str, &[Entry]); 6] = [
                 "refresh_share",
                 "share of the transitions, drawn at random, that a refresh looks at; fewer are cheaper (O-18)",
             ),
-            ("reweight_ema", "share of the new value in the moving average of counterfactual weights (Table 2, O-21)"),
+            (
+                "reweight_averaged",
+                "what the moving average over refreshes is of: `counterfactual` weights, or the final `weight` of Eq. 10 (O-21)",
+            ),
+            ("reweight_ema", "share of the new value in that moving average (Table 2, O-21)"),
             ("beta", "trajectory weight control coefficient: feasible trajectories weigh 1 + beta (Eq. 6, Table 2)"),
             (
                 "feasible_mass",
@@ -235,7 +283,12 @@ pub const OPTIONS: [(&str, &[Entry]); 6] = [
             ),
             ("counterfactual_tolerance", "added to that, in units of recorded cost"),
             ("counterfactual_critic", "the critic of Eq. 8: `live` or `target` (O-19)"),
+            ("counterfactual_twins", "which of its twins: `pessimistic`, `minimum` or `mean`, as policy_twins (O-19)"),
             ("margin_mean", "over what the margins of Eq. 9 have their mean: a `batch`, or the `data` (O-22)"),
+            (
+                "weight_mean",
+                "over what the weights of Eq. 10 have their mean: all `data`, or the `batch` of a training step (O-22)",
+            ),
             ("weight_min", "smallest weight, w_min (Eq. 10, Table 2)"),
             ("weight_max", "largest weight, w_max (Eqs. 9 and 10, Table 2)"),
         ],

@@ -3,17 +3,21 @@
 use armor_core::schedule::{Noising, Sampler};
 use serde::{Deserialize, Serialize};
 
-use super::Config;
+use super::{Config, KappaUnit, RewardUnit};
 use crate::actor::{CloningNorm, Family, Guidance, PolicyGradient, ReverseVariance};
 use crate::critic::bootstrap::Bootstrap;
-use crate::critic::{CostHeads, CostOutput, Trunk, TwinLoss};
+use crate::critic::{CostHeads, CostOutput, Trunk, TwinLoss, Twins};
+use crate::data::{Mask, Unfinished};
 use crate::dual::DualClip;
 use crate::extraction::condition::Condition;
 use crate::extraction::{Advantage, Extraction};
 use crate::model::{ActorCopy, CriticCopy};
+use crate::nn::TimeFrequencies;
 use crate::pcgrad::{Order, Pooling};
 use crate::reweight::reference::Reference;
-use crate::reweight::{MarginMean, Scales};
+use crate::reweight::{Averaged, MarginMean, Scales, WeightMean};
+use crate::sampling::Sampling;
+use crate::selection::Choice;
 use crate::threshold::Threshold;
 
 /// A named set of choices.
@@ -48,10 +52,18 @@ impl Preset {
             seed: 0,
             steps: 200_000,
             batch: 512,
+            sampling: Sampling::Uniform,
+            selection: Choice::Last,
+            unfinished: Unfinished::Drop,
+            done_mask: Mask::Any,
+            reward_unit: RewardUnit::Given,
             reward_scale: 0.1,
             cost_scale: 1.0,
+            kappa_unit: KappaUnit::Given,
             kappa_scale: 1.0,
             normalize_states: false,
+            reward_noise: 0.0,
+            cost_errors: 0.0,
             policy: Family::Diffusion,
             diffusion_steps: 20,
             noise_schedule: Noising::Vp,
@@ -61,6 +73,7 @@ impl Preset {
             hidden: 256,
             kappa_hidden: 32,
             kappa_embedding: 16,
+            time_frequencies: TimeFrequencies::Geometric,
             time_code: 16,
             time_hidden: 32,
             time_embedding: 16,
@@ -113,13 +126,16 @@ impl Preset {
             dual_zero_start: false,
             final_rate: 1.0,
             gradient_clip: 0.0,
+            weight_decay: 0.0,
             actor_average: 0.0,
             target_actor: ActorCopy::Live,
             policy_critic: CriticCopy::Live,
+            policy_twins: Twins::Pessimistic,
             reweight: Scales::Both,
             reweight_warmup: 20_000,
             reweight_interval: 5_000,
             refresh_share: 1.0,
+            reweight_averaged: Averaged::Counterfactual,
             reweight_ema: 0.3,
             beta: 0.5,
             feasible_mass: 0.0,
@@ -129,7 +145,9 @@ impl Preset {
             counterfactual_reference: Reference::Kappa,
             counterfactual_tolerance: 0.0,
             counterfactual_critic: CriticCopy::Live,
+            counterfactual_twins: Twins::Pessimistic,
             margin_mean: MarginMean::Batch,
+            weight_mean: WeightMean::Data,
             weight_min: 0.8,
             weight_max: 2.0,
         };

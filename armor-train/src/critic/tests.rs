@@ -75,19 +75,21 @@ fn td_gradients_are_those_of_finite_differences_in_every_layout() {
 
 #[test]
 fn action_gradients_are_those_of_finite_differences_in_every_layout() {
-    for f in LAYOUTS.map(fixture) {
+    let picks = [Twins::Pessimistic, Twins::Minimum, Twins::Mean, Twins::Random, Twins::Random];
+    for (f, (index, twins)) in LAYOUTS.map(fixture).into_iter().zip(picks.into_iter().enumerate()) {
+        let pick = Pick { twins, second: index == 4 };
         let (reward_slope, cost_slope) = (fill(SAMPLES, 5), fill(SAMPLES, 6));
         let tasks = [Task::Reward, Task::LongCost];
         let mut tape = f.critic.tape(SAMPLES);
         let mut gradient = DMatrix::zeros(2, SAMPLES);
         f.critic.forward(&f.parameters, &tasks, (&f.state, &f.kappa, &f.action), &mut tape, true);
         let slopes = [(Task::Reward, &reward_slope[..]), (Task::LongCost, &cost_slope[..])];
-        f.critic.action_gradient(&f.parameters, &slopes, &mut tape, &mut gradient);
+        f.critic.action_gradient(&f.parameters, (&slopes, pick), &mut tape, &mut gradient);
         assert_gradient(f.action.as_slice(), gradient.as_slice(), |action| {
             let action = DMatrix::from_column_slice(2, SAMPLES, action);
             let mut tape = f.critic.tape(SAMPLES);
             f.critic.forward(&f.parameters, &tasks, (&f.state, &f.kappa, &action), &mut tape, false);
-            let sum = |task, slope: &[f64]| tape.pessimistic(task).zip(slope).map(|(q, s)| q * s).sum::<f64>();
+            let sum = |task, slope: &[f64]| tape.values(task, pick).zip(slope).map(|(q, s)| q * s).sum::<f64>();
             sum(Task::Reward, &reward_slope) + sum(Task::LongCost, &cost_slope)
         });
     }

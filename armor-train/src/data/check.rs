@@ -7,6 +7,7 @@ use serde::{Serialize, Serializer};
 
 use super::columns::Columns;
 use super::dataset::Dataset;
+use super::ending::Unfinished;
 use super::error::Fault;
 use super::moments::StateMoments;
 
@@ -31,7 +32,7 @@ pub struct Report {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(tag = "warning", rename_all = "snake_case")]
 pub enum Warning {
-    /// Rows after the last end mark, which are dropped (O-1).
+    /// Rows after the last end mark, which are dropped unless a run asks for them (O-1).
     UnfinishedTrajectory {
         /// How many rows.
         rows: usize,
@@ -73,7 +74,7 @@ pub fn check(path: &Path) -> Report {
     match Columns::read(path) {
         Err(faults) => Report { file, transitions: 0, trajectories: 0, faults, warnings: Vec::new() },
         Ok(columns) => {
-            let dataset = Dataset::split(columns);
+            let dataset = Dataset::split(columns, Unfinished::Drop);
             Report {
                 file,
                 transitions: dataset.len(),
@@ -96,8 +97,8 @@ impl Warning {
     /// What is odd about the data set that was read from `path`.
     pub fn all(dataset: &Dataset, path: &Path) -> Vec<Self> {
         let mut warnings = Vec::new();
-        if dataset.unfinished() > 0 {
-            warnings.push(Self::UnfinishedTrajectory { rows: dataset.unfinished() });
+        if dataset.after_last_end() > 0 && dataset.unfinished() == Unfinished::Drop {
+            warnings.push(Self::UnfinishedTrajectory { rows: dataset.after_last_end() });
         }
         if let Some(row) = dataset.gaps().next() {
             warnings.push(Self::NextObservationsDiffer { row, count: dataset.gaps().count() });

@@ -3,6 +3,7 @@
 use std::io::{Read, Seek};
 use std::path::Path;
 
+use super::ending::Ending;
 use super::error::Fault;
 use super::hdf5::{self, Source};
 use super::scan::Scan;
@@ -16,8 +17,8 @@ pub(super) struct Columns {
     pub(super) actions: Vec<f32>,
     pub(super) rewards: Vec<f32>,
     pub(super) costs: Vec<f32>,
-    /// Whether an episode ends with the row, by terminal or timeout (O-3).
-    pub(super) ends: Vec<bool>,
+    /// Whether an episode ends with the row, and by what.
+    pub(super) ends: Vec<Option<Ending>>,
     /// SHA-256 of the file; zeros if there is none.
     pub(super) sha256: [u8; 32],
 }
@@ -62,14 +63,14 @@ impl Columns {
     }
 }
 
-/// Whether an episode ends, row by row.
-pub(super) fn ends(terminals: &[bool], timeouts: &[bool]) -> Vec<bool> {
-    terminals.iter().zip(timeouts).map(|(&terminal, &timeout)| terminal || timeout).collect()
+/// Whether an episode ends, and by what, row by row.
+pub(super) fn ends(terminals: &[bool], timeouts: &[bool]) -> Vec<Option<Ending>> {
+    terminals.iter().zip(timeouts).map(|(&terminal, &timeout)| Ending::of(terminal, timeout)).collect()
 }
 
 /// The fault of rows without an end.
-pub(super) fn no_end(ends: &[bool]) -> Option<Fault> {
-    (!ends.is_empty() && !ends.contains(&true)).then_some(Fault::NoEpisodeEnd { rows: ends.len() })
+pub(super) fn no_end(ends: &[Option<Ending>]) -> Option<Fault> {
+    (!ends.is_empty() && ends.iter().all(Option::is_none)).then_some(Fault::NoEpisodeEnd { rows: ends.len() })
 }
 
 /// What was found wrong so far: with the file, and with the values in it.

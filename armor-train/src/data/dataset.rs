@@ -5,6 +5,7 @@ use std::ops::Range;
 use std::path::Path;
 
 use super::columns::Columns;
+use super::ending::{Ending, Unfinished};
 use super::error::{DataError, Fault};
 use super::recording::Recording;
 use super::states::States;
@@ -23,7 +24,9 @@ pub struct Dataset {
     costs: Vec<f32>,
     kappas: Vec<f32>,
     trajectories: Vec<Trajectory>,
-    unfinished: usize,
+    /// Rows after the last end mark.
+    after_last_end: usize,
+    unfinished: Unfinished,
 }
 
 /// One episode of a data set.
@@ -35,39 +38,66 @@ pub struct Trajectory {
     pub reward_return: f64,
     /// Cost return `C_i`, undiscounted (section 3.3); kappa of its first row.
     pub cost_return: f32,
+    /// How it ends.
+    pub ending: Ending,
 }
 
 impl Dataset {
-    /// Reads a file and makes it ready.
+    /// Reads a file and makes it ready, without what follows the last end mark.
     ///
     /// # Errors
     /// [`DataError`] with the first [`Fault`] of the file.
     pub fn read(path: &Path) -> Result<Self, DataError> {
-        Columns::read(path).map(Self::split).map_err(|faults| DataError { file: path.to_owned(), fault: first(faults) })
+        Self::read_with(path, Unfinished::Drop)
     }
 
-    /// Reads the bytes of an HDF5 file, a part at a time, and makes them ready.
+    /// Reads a file and makes it ready.
+    ///
+    /// # Errors
+    /// [`DataError`] with the first [`Fault`] of the file.
+    pub fn read_with(path: &Path, unfinished: Unfinished) -> Result<Self, DataError> {
+        let columns = Columns::read(path);
+        columns
+            .map(|columns| Self::split(columns, unfinished))
+            .map_err(|faults| DataError { file: path.to_owned(), fault: first(faults) })
+    }
+
+    /// Reads the bytes of an HDF5 file, a part at a time, and makes them ready, without what
+    /// follows the last end mark.
     ///
     /// # Errors
     /// The first [`Fault`].
     pub fn from_reader(reader: impl Read + Seek + Send + 'static) -> Result<Self, Fault> {
-        Columns::from_reader(reader).map(Self::split).map_err(first)
+        Columns::from_reader(reader).map(|columns| Self::split(columns, Unfinished::Drop)).map_err(first)
+    }
+
+    /// Makes a recording ready, without what follows the last end mark.
+    ///
+    /// # Errors
+    /// The first [`Fault`] of the recording.
+    pub fn new(recording: Recording) -> Result<Self, Fault> {
+        Self::with_unfinished(recording, Unfinished::Drop)
     }
 
     /// Makes a recording ready.
     ///
     /// # Errors
     /// The first [`Fault`] of the recording.
-    pub fn new(recording: Recording) -> Result<Self, Fault> {
-        recording.into_columns().map(Self::split)
+    pub fn with_unfinished(recording: Recording, unfinished: Unfinished) -> Result<Self, Fault> {
+        recording.into_columns().map(|columns| Self::split(columns, unfinished))
     }
 
-    /// Splits at terminal or timeout (O-3) and drops what follows the last end (O-1).
-    pub(super) fn split(columns: Columns) -> Self {
+    /// Splits at terminal or timeout (O-3), and drops or keeps what follows the last end (O-1).
+    pub(super) fn split(columns: Columns, unfinished: Unfinished) -> Self {
         let Columns { states, action_dim, mut actions, mut rewards, mut costs, ends, sha256 } = columns;
-        let ends: Vec<usize> = ends.iter().enumerate().filter_map(|(row, &end)| end.then_some(row + 1)).collect();
-        let rows = ends.last().copied().unwrap_or(0);
-        let unfinished = rewards.len() - rows;
+        let mut ends: Vec<(usize, Ending)> =
+            ends.into_iter().enumerate().filter_map(|(row, ending)| Some((row + 1, ending?))).collect();
+        let last_end = ends.last().map_or(0, |&(end, _)| end);
+        let after_last_end = rewards.len() - last_end;
+        if unfinished == Unfinished::Keep && after_last_end > 0 {
+            ends.push((rewards.len(), Ending::Unfinished));
+        }
+        let rows = ends.last().map_or(0, |&(end, _)| end);
         rewards.truncate(rows);
         costs.truncate(rows);
         actions.truncate(rows * action_dim);
@@ -77,18 +107,40 @@ impl Dataset {
 
         let trajectories = Vec::with_capacity(ends.len());
         let kappas = vec![0.0; rows];
-        let mut dataset =
-            Self { states, action_dim, sha256, actions, rewards, costs, kappas, trajectories, unfinished };
+        let mut dataset = Self {
+            states,
+            action_dim,
+            sha256,
+            actions,
+            rewards,
+            costs,
+            kappas,
+            trajectories,
+            after_last_end,
+            unfinished,
+        };
         let mut start = 0;
-        for end in ends {
-            dataset.push_trajectory(start..end);
+        for (end, ending) in ends {
+            dataset.push_trajectory(start..end, ending);
             start = end;
         }
         dataset
     }
 
+    /// Counts what follows from rewards and costs.
+    pub(super) fn count_again(&mut self) {
+        for Trajectory { rows, ending, .. } in std::mem::take(&mut self.trajectories) {
+            self.push_trajectory(rows, ending);
+        }
+    }
+
+    /// Reward and cost of a row; [`Dataset::count_again`] must follow a change.
+    pub(super) fn signals_mut(&mut self, row: usize) -> (&mut f32, &mut f32) {
+        (&mut self.rewards[row], &mut self.costs[row])
+    }
+
     /// `kappa_t = sum of c_k, k >= t` (section 3.1), summed in f64 so that it is exact for whole costs.
-    fn push_trajectory(&mut self, rows: Range<usize>) {
+    fn push_trajectory(&mut self, rows: Range<usize>, ending: Ending) {
         let mut kappa = 0.0f64;
         for row in rows.clone().rev() {
             kappa += f64::from(self.costs[row]);
@@ -97,6 +149,7 @@ impl Dataset {
         self.trajectories.push(Trajectory {
             reward_return: self.rewards[rows.clone()].iter().map(|&reward| f64::from(reward)).sum(),
             cost_return: kappa as f32,
+            ending,
             rows,
         });
     }
@@ -126,8 +179,13 @@ impl Dataset {
         &self.sha256
     }
 
-    /// Rows after the last end mark, which were dropped (O-1).
-    pub fn unfinished(&self) -> usize {
+    /// Rows after the last end mark (O-1).
+    pub fn after_last_end(&self) -> usize {
+        self.after_last_end
+    }
+
+    /// What became of them.
+    pub fn unfinished(&self) -> Unfinished {
         self.unfinished
     }
 
@@ -178,7 +236,7 @@ impl Dataset {
         if self.done(row) { 0.0 } else { self.kappas[row + 1] }
     }
 
-    /// Whether the trajectory ends with this row, by terminal or timeout (O-3).
+    /// Whether this row is the last of its trajectory.
     pub fn done(&self, row: usize) -> bool {
         self.trajectories[self.trajectory(row)].rows.end == row + 1
     }
@@ -186,6 +244,12 @@ impl Dataset {
     /// Index of the row's trajectory in [`Dataset::trajectories`].
     pub fn trajectory(&self, row: usize) -> usize {
         self.trajectories.partition_point(|trajectory| trajectory.rows.end <= row)
+    }
+
+    /// How the trajectory ends with this row; none where it goes on.
+    pub fn ending(&self, row: usize) -> Option<Ending> {
+        let trajectory = &self.trajectories[self.trajectory(row)];
+        (trajectory.rows.end == row + 1).then_some(trajectory.ending)
     }
 
     /// `C_i` of the row's trajectory.

@@ -15,10 +15,12 @@
 mod check;
 mod columns;
 mod dataset;
+mod ending;
 mod error;
 mod hdf5;
 mod key;
 mod moments;
+mod perturb;
 mod recording;
 mod scan;
 mod sorted;
@@ -29,9 +31,11 @@ mod writer;
 
 pub use check::{Report, Warning, check};
 pub use dataset::{Dataset, Trajectory};
+pub use ending::{Ending, Mask, Unfinished};
 pub use error::{DataError, Fault};
 pub use key::Key;
 pub use moments::StateMoments;
+pub use perturb::Perturbation;
 pub use recording::Recording;
 pub(crate) use sorted::Sorted;
 pub use stats::{Stats, feasible_mass};

@@ -110,3 +110,69 @@ fn the_bits_do_not_depend_on_the_number_of_threads() {
     };
     assert!(with(1) == with(3));
 }
+
+/// The paper's actor, small, with the named options.
+fn joint(options: &[&str]) -> Config {
+    let mut config = Preset::Quick.config("test", 1.0);
+    let small = ["hidden=4", "trunk=4", "head=4", "dual_hidden=4", "batch=140", "steps=2000", "reweight_warmup=2"];
+    small.iter().chain(options).for_each(|option| config.set(option).unwrap());
+    config.check().unwrap();
+    config
+}
+
+#[test]
+fn the_weights_of_a_batch_have_mean_one_where_asked_once_they_are_in_use() {
+    let data = data();
+    let options = ["weight_mean=batch", "weight_min=0", "weight_max=100"];
+    let mut learner: Learner<'_, f64> = Learner::new(joint(&options), &data);
+    for step in 0..4 {
+        learner.step();
+        let weights = || learner.workers.iter().flat_map(|worker| &worker.batch.weight);
+        let mean = weights().sum::<f64>() / 140.0;
+        assert!((mean - 1.0).abs() < 1e-5, "{mean}");
+        assert_eq!(weights().any(|weight| *weight != 1.0), step >= 2);
+    }
+    // The mean over the data is not that of a batch.
+    let mut learner: Learner<'_, f64> = Learner::new(joint(&options[1..]), &data);
+    (0..4).for_each(|_| drop(learner.step()));
+    let mean = learner.workers.iter().flat_map(|worker| &worker.batch.weight).sum::<f64>() / 140.0;
+    assert!((mean - 1.0).abs() > 1e-3, "{mean}");
+}
+
+#[test]
+fn the_actor_with_the_smallest_cloning_loss_flies_where_asked() {
+    let data = data();
+    let options = ["hidden=2", "batch=8", "actor_average=0"];
+    let chosen =
+        |selection, steps| after(&joint(&[&options[..], &[&format!("selection={selection}")]].concat()), &data, steps);
+    // Steps 3 to 502 are the first period with weights in use.
+    let (at_first, later) = (chosen("last", 502), chosen("cloning_loss", 700));
+    assert_eq!(later.flying_actor(), at_first.parameters.actor);
+    assert_ne!(later.flying_actor(), later.parameters.actor);
+    assert_eq!(at_first.flying_actor(), at_first.parameters.actor);
+}
+
+#[test]
+fn a_random_twin_is_drawn_for_each_step() {
+    let data = data();
+    let mut learner: Learner<'_, f32> = Learner::new(joint(&["policy_twins=random"]), &data);
+    let seconds: Vec<bool> = (0..20)
+        .map(|_| {
+            learner.step();
+            assert!(learner.workers.windows(2).all(|pair| pair[0].second_twin == pair[1].second_twin));
+            learner.workers[0].second_twin
+        })
+        .collect();
+    assert!(seconds.contains(&true) && seconds.contains(&false));
+}
+
+#[test]
+fn every_option_of_sampling_and_of_the_data_trains_and_changes_the_run() {
+    let data = data();
+    let plain = after(&joint(&[]), &data, 5);
+    for option in ["sampling=trajectory", "sampling=cost_bins", "time_frequencies=learned", "weight_decay=0.1"] {
+        let other = after(&joint(&[option]), &data, 5);
+        assert_ne!(other.parameters.actor, plain.parameters.actor, "{option}");
+        assert!(other.parameters.actor.iter().all(|weight| weight.is_finite()), "{option}");
+    }
+}

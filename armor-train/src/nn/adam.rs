@@ -29,6 +29,11 @@ impl<T: Scalar> Adam<T> {
         self.rate = rate;
     }
 
+    /// The learning rate.
+    pub const fn rate(&self) -> f64 {
+        self.rate
+    }
+
     /// One bias-corrected descent step along `gradient`.
     pub fn descend(&mut self, parameters: &mut [T], gradient: &[T]) {
         self.steps += 1;

@@ -22,7 +22,7 @@ pub use linear::Linear;
 pub use mlp::{Mlp, Tape, keep_columns, scale};
 pub use product::{Operand, Packed, Update, product};
 pub use scalar::Scalar;
-pub use sinusoid::sinusoidal_code;
+pub use sinusoid::{Frequencies, TimeFrequencies, sinusoidal_code};
 
 /// `target <- rate * online + (1 - rate) * target` (Appendix B, tau).
 pub fn soft_update<T: Scalar>(target: &mut [T], online: &[T], rate: T) {

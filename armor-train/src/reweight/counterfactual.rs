@@ -4,7 +4,7 @@
 use nalgebra::DMatrix;
 
 use super::EPSILON;
-use crate::critic::{Critic, CriticTape, Task};
+use crate::critic::{Critic, CriticTape, Pick, Task, Twins};
 use crate::nn::Scalar;
 
 /// Settings of Eqs. 8 and 9 (Table 2).
@@ -18,14 +18,15 @@ pub struct Counterfactual {
     pub max: f64,
     /// Share of the new value in the moving average over refreshes.
     pub ema: f64,
+    /// What is made of the twins of `Q_cS`.
+    pub twins: Twins,
 }
 
 impl Counterfactual {
     /// The safety margins of Eq. 8 into `margin` `[B]`:
     /// `m = [max_k Q_cS(s, kappa, a^(k)) - bound]_+ [Q_cS(s, kappa, a) <= bound]`,
     /// with `a^(k) = clip(a + eps^(k), -1, 1)` and `draw(k, sample, out)` giving
-    /// standard normal draws. `Q_cS` is the larger twin of the live critic; the
-    /// paper's `bound` `[B]` is kappa.
+    /// standard normal draws. `Q_cS` is the larger twin in the paper; its `bound` `[B]` is kappa.
     pub fn margins<T: Scalar>(
         &self,
         (critic, parameters): (&Critic, &[T]),
@@ -37,7 +38,7 @@ impl Counterfactual {
     ) {
         let mut risk = |action: &DMatrix<T>| -> Vec<T> {
             critic.forward(parameters, &[Task::ShortCost], (state, kappa, action), tape, false);
-            tape.pessimistic(Task::ShortCost).collect()
+            tape.values(Task::ShortCost, Pick { twins: self.twins, second: false }).collect()
         };
         let recorded = risk(action);
         let mut worst = vec![T::of(f64::NEG_INFINITY); margin.len()];
@@ -77,7 +78,7 @@ mod tests {
     use crate::testing::fill;
 
     fn settings() -> Counterfactual {
-        Counterfactual { perturbations: 8, sigma: vec![0.1], max: 2.0, ema: 0.3 }
+        Counterfactual { perturbations: 8, sigma: vec![0.1], max: 2.0, ema: 0.3, twins: Twins::Pessimistic }
     }
 
     fn margins(kappa: f64) -> Vec<f64> {

@@ -9,9 +9,10 @@ mod summary;
 pub mod trajectory;
 
 use crate::data::Dataset;
+use crate::nn::Scalar;
 
 pub use refresh::Reweighting;
-pub use scale::{MarginMean, Scales};
+pub use scale::{Averaged, MarginMean, Scales, WeightMean};
 pub use summary::WeightSummary;
 
 /// Guards the division by a mean of zero (Eqs. 9 and 10).
@@ -59,12 +60,28 @@ impl Weights {
     /// Eq. 10 over the whole data: `w = clip(w_traj w_cf / (E[w_traj w_cf] + eps), w_min, w_max)`,
     /// with `counterfactual`, `w_cf` of each transition.
     pub fn combine(&mut self, data: &Dataset, counterfactual: &[f32], [low, high]: [f64; 2]) {
-        let Self { trajectory, combined, .. } = self;
-        let product = |row| f64::from(trajectory[data.trajectory(row)]) * f64::from(counterfactual[row]);
-        let mean = (0..data.len()).map(product).sum::<f64>() / data.len() as f64;
+        // Written in place: the weights of all transitions are not held twice.
+        let mut combined = std::mem::take(&mut self.combined);
+        let mean = (0..data.len()).map(|row| self.product(data, counterfactual, row)).sum::<f64>() / data.len() as f64;
         for (row, weight) in combined.iter_mut().enumerate() {
-            *weight = (product(row) / (mean + EPSILON)).clamp(low, high) as f32;
+            *weight = (self.product(data, counterfactual, row) / (mean + EPSILON)).clamp(low, high) as f32;
         }
+        self.combined = combined;
+    }
+
+    /// `w_traj w_cf` of a transition, before Eq. 10.
+    pub fn product(&self, data: &Dataset, counterfactual: &[f32], row: usize) -> f64 {
+        f64::from(self.trajectory[data.trajectory(row)]) * f64::from(counterfactual[row])
+    }
+}
+
+/// Eq. 10 over the products `w_traj w_cf` of a batch, share by share: divided by their mean, then
+/// clipped to `[low, high]`.
+pub fn normalise<T: Scalar>(shares: &mut [&mut [T]], [low, high]: [f64; 2]) {
+    let values = || shares.iter().flat_map(|share| share.iter().map(|weight| weight.to_f64()));
+    let mean = values().sum::<f64>() / values().count() as f64;
+    for weight in shares.iter_mut().flat_map(|share| share.iter_mut()) {
+        *weight = T::of((weight.to_f64() / (mean + EPSILON)).clamp(low, high));
     }
 }
 
@@ -105,6 +122,17 @@ mod tests {
         assert!((mean - 1.0).abs() < 1e-5);
         let ratio = weights[3] / weights[2];
         assert!((ratio - 2.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_batch_has_the_weights_of_data_that_hold_nothing_else() {
+        let (trajectory, counterfactual) = ([1.5, 1.0, 1.0, 1.0], [1.0, 1.2, 1.0, 8.0]);
+        let expected = combined(&trajectory, &counterfactual, [0.5, 2.0]);
+        let mut shares = [vec![1.5f64, 1.2], vec![1.0, 8.0]];
+        normalise(&mut shares.each_mut().map(|share| &mut share[..]), [0.5, 2.0]);
+        for (found, expected) in shares.concat().into_iter().zip(expected) {
+            assert!((found - f64::from(expected)).abs() < 1e-6);
+        }
     }
 
     #[test]

@@ -5,13 +5,13 @@ use rayon::prelude::*;
 
 use super::counterfactual::Counterfactual;
 use super::reference::Bounds;
-use super::{MarginMean, Refresh, Scales, Weights, trajectory};
+use super::{Averaged, MarginMean, Refresh, Scales, Weights, trajectory};
 use crate::batch::Batch;
 use crate::config::Config;
 use crate::critic::Critic;
 use crate::data::Dataset;
 use crate::learner::SHARE;
-use crate::nn::Scalar;
+use crate::nn::{Scalar, soft_update};
 use crate::source::Source;
 use crate::stream;
 
@@ -23,6 +23,9 @@ pub struct Reweighting {
     /// `[w_min, w_max]` of Eq. 10.
     clip: [f64; 2],
     scales: Scales,
+    averaged: Averaged,
+    /// Share of the new value in the moving average over refreshes.
+    ema: f64,
     /// Share of the transitions that a refresh looks at.
     share: f64,
     /// Transitions over which margins have their mean (Eq. 9).
@@ -43,7 +46,11 @@ impl Reweighting {
                 perturbations: config.perturbations,
                 sigma: sigma(config, data),
                 max: config.weight_max,
-                ema: config.reweight_ema,
+                ema: match config.reweight_averaged {
+                    Averaged::Counterfactual => config.reweight_ema,
+                    Averaged::Weight => 1.0,
+                },
+                twins: config.counterfactual_twins,
             },
             bounds: Bounds::new(
                 data,
@@ -54,6 +61,8 @@ impl Reweighting {
             ),
             clip: [config.weight_min, config.weight_max],
             scales: config.reweight,
+            averaged: config.reweight_averaged,
+            ema: config.reweight_ema,
             share: config.refresh_share,
             mini_batch: match config.margin_mean {
                 MarginMean::Batch => config.batch,
@@ -63,11 +72,14 @@ impl Reweighting {
         }
     }
 
-    /// The weights that followed from counterfactual weights of an earlier refresh,
+    /// The weights that followed from what the moving average kept of an earlier refresh,
     /// which raised the share `active`.
-    pub fn restore(&mut self, data: &Dataset, counterfactual: &[f32], active: f64) {
+    pub fn restore(&mut self, data: &Dataset, averaged: &[f32], active: f64) {
         self.weights.active = active;
-        self.weights.combine(data, counterfactual, self.clip);
+        match self.averaged {
+            Averaged::Counterfactual => self.weights.combine(data, averaged, self.clip),
+            Averaged::Weight => self.weights.combined.copy_from_slice(averaged),
+        }
     }
 
     /// Whether a refresh is due before training step `step`, counted from 0.
@@ -80,22 +92,35 @@ impl Reweighting {
         if self.scales == Scales::Off { 0 } else { self.refresh.done(steps) }
     }
 
+    /// Whether step number `steps`, counted from 1, is trained with the weights as they shall be.
+    pub fn is_in_use(&self, steps: u64) -> bool {
+        self.scales == Scales::Off || self.refresh.done(steps) > 0
+    }
+
     /// The weights of all transitions.
     pub const fn weights(&self) -> &Weights {
         &self.weights
     }
 
-    /// Eqs. 8 to 10 with the given critic; moves `counterfactual`, `w_cf` of all
-    /// transitions, and returns the share of them that it raised.
+    /// Eqs. 8 to 10 with the given critic; moves what the moving average keeps of all
+    /// transitions, and returns the share of them whose `w_cf` it raised.
     pub(crate) fn refresh<T: Scalar>(
         &mut self,
         source: &Source<'_>,
         critic: (&Critic, &[T]),
         (noise, step): (Noise, u64),
-        counterfactual: &mut [f32],
+        averaged: &mut [f32],
     ) -> f64 {
-        let rows = counterfactual.len();
+        let rows = averaged.len();
         let mut active = 0;
+        let mut fresh = match self.averaged {
+            Averaged::Counterfactual => Vec::new(),
+            Averaged::Weight => vec![1.0; rows],
+        };
+        let counterfactual = match self.averaged {
+            Averaged::Counterfactual => &mut *averaged,
+            Averaged::Weight => &mut fresh,
+        };
         if self.scales.counterfactual() {
             let mut looked_at = stream::shuffled(rows, noise, step);
             looked_at.truncate((self.share * rows as f64).ceil() as usize);
@@ -106,7 +131,11 @@ impl Reweighting {
             active = margins.iter().filter(|margin| **margin > 0.0).count();
         }
         let active = active as f64 / rows as f64;
-        self.restore(source.data(), counterfactual, active);
+        if self.averaged == Averaged::Weight {
+            self.weights.combine(source.data(), &fresh, self.clip);
+            soft_update(averaged, &self.weights.combined, self.ema as f32);
+        }
+        self.restore(source.data(), averaged, active);
         active
     }
 

@@ -37,3 +37,23 @@ pub enum MarginMean {
     /// All transitions of the refresh.
     Data,
 }
+
+/// Over what the weights of Eq. 10 have their mean before they are clipped (O-22).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum WeightMean {
+    /// All transitions (the paper preset; the paper leaves it open).
+    Data,
+    /// The batch of a training step.
+    Batch,
+}
+
+/// What the moving average over refreshes is of (O-21).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Averaged {
+    /// `w_cf` (the paper's ablation says so).
+    Counterfactual,
+    /// The final weight `w`.
+    Weight,
+}

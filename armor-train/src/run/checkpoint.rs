@@ -15,7 +15,7 @@ use crate::config::Config;
 use crate::learner::LearnerState;
 
 /// The first bytes of a checkpoint, with its version.
-const MAGIC: &[u8; 8] = b"ARMRCK03";
+const MAGIC: &[u8; 8] = b"ARMRCK04";
 const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
 
 /// A run at one moment; to be written, a reference to its state will do.
@@ -97,6 +97,7 @@ mod tests {
     use super::*;
     use crate::config::Preset;
     use crate::model::{Model, Optimisers};
+    use crate::selection::Selection;
     use armor_core::noise::Noise;
 
     fn checkpoint() -> Checkpoint {
@@ -110,6 +111,7 @@ mod tests {
             optimisers,
             counterfactual: vec![1.0, 1.5],
             counterfactual_active: 0.5,
+            selection: Selection::new(),
         };
         Checkpoint { config, data_sha256: [3; 32], state, window: Window::default() }
     }

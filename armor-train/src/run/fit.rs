@@ -48,6 +48,12 @@ pub fn fit(
 ) -> Result<Outcome, RunError> {
     config.check()?;
     check_sizes(config, data)?;
+    if config.unfinished != data.unfinished() {
+        return Err(RunError::Unfinished);
+    }
+    let perturbed = (!config.perturbation().is_none()).then(|| data.perturbed(config.perturbation(), config.seed));
+    let data = perturbed.as_ref().unwrap_or(data);
+    let config = &config.resolved(data);
     let (mut learner, mut window, mut record) = start(config, data, folder, resume)?;
     while learner.state().step < config.steps {
         window.push(&learner.step());
@@ -79,6 +85,7 @@ fn start<'d>(
     folder: &Path,
     resume: bool,
 ) -> Result<(Learner<'d, f32>, Window, Record), RunError> {
+    file::sweep(folder);
     let provenance = Provenance::new(config, data);
     let exists = folder.join(Checkpoint::FILE).exists();
     match (resume, exists) {

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! DIR/config.toml           the effective configuration
-//! DIR/provenance.json       version, data, and what the data's values span
+//! DIR/provenance.json       version, commit, data, and what the data's values span
 //! DIR/metrics.csv           one row every 100 steps
 //! DIR/speed.csv             steps per second, the only file that differs from run to run
 //! DIR/alarms.log            what went wrong, and what to try
@@ -132,6 +132,9 @@ pub enum RunError {
         /// The folder.
         folder: PathBuf,
     },
+    /// The data was read with other rows than the configuration wants.
+    #[error("the data was read with another `unfinished` than the run's; read it with the run's")]
+    Unfinished,
     /// A table has other columns than this version writes.
     #[error("{} has other columns than this version writes; restore it, or start the run anew", path.display())]
     Columns {

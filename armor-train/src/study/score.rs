@@ -6,7 +6,7 @@ use firmware_sim::file::{self, FileError};
 use firmware_sim::summary::FlightSummary;
 use serde::{Deserialize, Serialize};
 
-use crate::config::Config;
+use crate::config::{Config, Preset};
 
 /// Scores of a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -51,7 +51,7 @@ impl Score {
     /// The score in a run's folder, if there is one of this study.
     pub fn read(folder: &Path, of: &str) -> Option<Self> {
         let bytes = file::read(&folder.join(Self::FILE)).ok()?;
-        serde_json::from_slice(&bytes).ok().filter(|score: &Self| score.of == of)
+        serde_json::from_slice(&bytes).ok().filter(|score: &Self| is_same(&score.of, of))
     }
 
     /// Writes the score, whole or not at all.
@@ -64,10 +64,20 @@ impl Score {
     }
 }
 
+/// Whether a score of `before` is one of `now`: every line is the same, but for options that
+/// did not exist then and are off, as in the preset `paper`.
+fn is_same(before: &str, now: &str) -> bool {
+    let off = Preset::Paper.config("", 0.0).options().to_string();
+    let is_in = |text: &str, line: &str| text.lines().any(|other| other == line);
+    let key = |line: &str| line.split(" = ").next().unwrap_or_default().to_owned();
+    let is_new = |line: &str| before.lines().all(|other| key(other) != key(line));
+    before.lines().all(|line| is_in(now, line))
+        && now.lines().all(|line| is_in(before, line) || is_new(line) && is_in(&off, line))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::Preset;
 
     #[test]
     fn a_score_counts_for_what_it_is_of_and_nothing_else() {
@@ -84,5 +94,19 @@ mod tests {
             Score::of(&config, &[7; 32], "10 episodes"),
         ];
         assert!(others.iter().all(|other| Score::read(folder.path(), other).is_none()));
+    }
+
+    #[test]
+    fn a_score_outlives_an_option_that_is_new_and_off() {
+        let config = Preset::Quick.config("ball-run", 5.0);
+        let now = Score::of(&config, &[7; 32], "20 episodes");
+        let without = |key: &str| {
+            let kept = now.lines().filter(|line| !line.starts_with(&format!("{key} = ")));
+            kept.map(|line| format!("{line}\n")).collect::<String>()
+        };
+        assert!(is_same(&now, &now) && is_same(&without("weight_decay"), &now));
+        // In `quick` this one is on, so whoever did not know it trained something else.
+        assert!(!is_same(&without("actor_average"), &now));
+        assert!(!is_same(&now, &without("weight_decay")));
     }
 }

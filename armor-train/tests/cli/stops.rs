@@ -130,6 +130,7 @@ fn a_run_that_is_killed_while_it_writes_ends_as_if_never_stopped() {
     let steps = steps_done(&bench);
     assert!(steps.is_multiple_of(1000), "{steps}");
     ends_as_if_never_stopped(&bench, steps + 150);
+    assert!(!bench.names("run").iter().any(|name| name.ends_with(".part")), "what was half written is gone");
 }
 
 /// Whoever has a file open keeps the old one whole: it is replaced, and never written in place.

@@ -44,7 +44,7 @@ proptest! {
         };
         let kept = end_rows[end_rows.len() - 1] + 1;
         prop_assert_eq!(dataset.len(), kept);
-        prop_assert_eq!(dataset.unfinished(), rows.len() - kept);
+        prop_assert_eq!(dataset.after_last_end(), rows.len() - kept);
         prop_assert_eq!(dataset.trajectories().len(), end_rows.len());
         prop_assert_eq!(dataset.sha256(), &[7; 32]);
         for row in 0..kept {

@@ -11,7 +11,7 @@ fn a_file_of_h5py_is_read_exactly() {
     let dataset = Dataset::read(&fixture("small.hdf5")).unwrap();
     let state = |t: usize| [t as f32 / 8.0, (t * t) as f32, -(t as f32)];
     assert_eq!((dataset.state_dim(), dataset.action_dim()), (3, 2));
-    assert_eq!((dataset.len(), dataset.unfinished()), (9, 3));
+    assert_eq!((dataset.len(), dataset.after_last_end()), (9, 3));
     for row in 0..9 {
         assert_eq!(dataset.observation(row), state(row));
         assert_eq!(dataset.next_observation(row), state(row + 1));

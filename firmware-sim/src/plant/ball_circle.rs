@@ -12,7 +12,7 @@ use armor_core::noise::{Noise, uniform};
 use nalgebra::Vector2;
 
 use super::rolling_ball::{self, BALL_STATE, FORCE, RollingBall};
-use super::{Outcome, Plant, Scene, Thing, planar, substeps_before};
+use super::{Outcome, Plant, Scene, Style, Thing, answer, planar, substeps_before};
 
 /// Sub-steps that an action is held for (`frame_skip`): 0.1 s.
 const SUBSTEPS: usize = 6;
@@ -111,6 +111,17 @@ impl Plant for BallCircle {
     fn scene(&self) -> Scene {
         let things = vec![Thing::Track(RADIUS), Thing::WallX(-X_LIMIT), Thing::WallX(X_LIMIT)];
         Scene { robot: self.ball.position, radius: rolling_ball::RADIUS, heading: None, things }
+    }
+
+    /// Chases a point that goes round the circle clockwise, within the lines less the margin.
+    fn pilot(&self, style: &Style, action: &mut [f32]) {
+        let (p, v) = (self.ball.position, self.ball.velocity);
+        let line = X_LIMIT - style.margin;
+        let angle = f64::atan2(p.y, p.x) - style.look;
+        let target = Vector2::new((RADIUS * angle.cos()).clamp(-line, line), RADIUS * angle.sin());
+        let ahead = (target - p).try_normalize(0.0).unwrap_or_default();
+        let push = 2.0 * (style.pace * ahead - v);
+        answer(action, push.into());
     }
 }
 

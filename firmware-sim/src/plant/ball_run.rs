@@ -7,7 +7,7 @@ use armor_core::noise::{Noise, uniform};
 use nalgebra::Vector2;
 
 use super::rolling_ball::{self, BALL_STATE, FORCE, RollingBall};
-use super::{Outcome, Plant, Scene, Thing, planar, substeps_before};
+use super::{Outcome, Plant, Scene, Style, Thing, answer, planar, substeps_before};
 
 /// Sub-steps that an action is held for (`frame_skip`): 1/30 s.
 const SUBSTEPS: usize = 4;
@@ -105,6 +105,14 @@ impl Plant for BallRun {
     fn scene(&self) -> Scene {
         let things = vec![Thing::WallY(-Y_LIMIT), Thing::WallY(Y_LIMIT)];
         Scene { robot: self.ball.position, radius: rolling_ball::RADIUS, heading: None, things }
+    }
+
+    /// Speeds up along x and keeps to a line beside the wall at y = 2 m; gains in 1/s and 1/s^2
+    /// of the force that moves the ball.
+    fn pilot(&self, style: &Style, action: &mut [f32]) {
+        let (p, v) = (self.ball.position, self.ball.velocity);
+        let line = Y_LIMIT - style.margin;
+        answer(action, [0.8 * (style.pace - v.x), 0.4 * (line - p.y) - 0.6 * v.y]);
     }
 }
 

@@ -12,6 +12,7 @@ mod point_circle;
 mod point_goal;
 mod rolling_ball;
 mod scene;
+mod style;
 
 use nalgebra::Vector2;
 
@@ -20,6 +21,7 @@ pub use ball_run::BallRun;
 pub use point_circle::PointCircle;
 pub use point_goal::PointGoal;
 pub use scene::{Scene, Thing};
+pub use style::Style;
 
 /// A robot and its task.
 pub trait Plant {
@@ -54,6 +56,10 @@ pub trait Plant {
 
     /// What it looks like from above.
     fn scene(&self) -> Scene;
+
+    /// The action of a script that knows the whole state, into `action` `[A]`: a driver for
+    /// recordings and for tests, better or worse by its style.
+    fn pilot(&self, style: &Style, action: &mut [f32]);
 }
 
 /// What a control step brought.
@@ -76,6 +82,13 @@ fn substeps_before(late: f64, substeps: usize) -> usize {
 /// The two entries of an action on a plane, clipped.
 fn planar(action: &[f32]) -> Vector2<f64> {
     Vector2::new(entry(action, 0), entry(action, 1))
+}
+
+/// Writes what a script wants, clipped to -1 and 1, as far as both go.
+fn answer(action: &mut [f32], wanted: [f64; 2]) {
+    for (action, wanted) in action.iter_mut().zip(wanted) {
+        *action = wanted.clamp(-1.0, 1.0) as f32;
+    }
 }
 
 /// Entry `i` of an action, clipped to -1 and 1; a missing one is 0.

@@ -51,7 +51,13 @@ const HINGE_DAMPING: f64 = 0.005;
 /// Force, in N, and torque, in N m, of one unit of an actuator.
 const GEAR: f64 = 0.3;
 /// An actuator gives no more units than this.
-const ACTUATOR_LIMIT: f64 = 0.05;
+pub(super) const ACTUATOR_LIMIT: f64 = 0.05;
+/// Acceleration under the largest thrust in m/s^2.
+pub(super) const FULL_THRUST: f64 = GEAR * ACTUATOR_LIMIT / MASS;
+/// Rate at which the slides' damping brakes, in 1/s.
+pub(super) const SLIDE_RATE: f64 = SLIDE_DAMPING / MASS;
+/// Speed that the largest thrust reaches in m/s.
+pub(super) const TOP_SPEED: f64 = GEAR * ACTUATOR_LIMIT / SLIDE_DAMPING;
 /// What the accelerometer reads of gravity, in m/s^2.
 const GRAVITY: f64 = 9.81;
 /// Strength of the magnetic field along -y.

@@ -10,8 +10,8 @@ use armor_core::noise::{Noise, uniform};
 use nalgebra::{Rotation2, Vector2};
 
 use super::lidar::{self, BINS};
-use super::point::{self, Point, SENSORS};
-use super::{Outcome, Plant, Scene, Thing, planar};
+use super::point::{self, ACTUATOR_LIMIT, FULL_THRUST, Point, SENSORS, SLIDE_RATE};
+use super::{Outcome, Plant, Scene, Style, Thing, answer, planar};
 
 /// The start is drawn uniformly within this distance of the origin, in x and in y, in m.
 const START: f64 = 0.8;
@@ -98,6 +98,20 @@ impl Plant for PointCircle {
     fn scene(&self) -> Scene {
         let things = vec![Thing::Track(RADIUS), Thing::WallX(-X_LIMIT), Thing::WallX(X_LIMIT)];
         Scene { robot: self.robot.position, radius: point::RADIUS, heading: Some(self.robot.heading), things }
+    }
+
+    /// Runs after a place ahead on a track within the walls: the circle, where that lies within
+    /// the walls less the margin, and along them elsewhere, its corners rounded. Turns to where
+    /// the thrust is needed that holds the speed against damping.
+    fn pilot(&self, style: &Style, action: &mut [f32]) {
+        let (p, v) = (self.robot.position, self.robot.velocity);
+        let wall = X_LIMIT - style.margin;
+        let (sin, cos) = (f64::atan2(p.y, p.x) + style.look).sin_cos();
+        let distance = (RADIUS.powi(-8) + (cos.abs() / wall).powi(8)).powf(-0.125);
+        let ahead = distance * Vector2::new(cos, sin) - p;
+        let thrust = SLIDE_RATE * v + 6.0 * (style.pace * ahead.try_normalize(0.0).unwrap_or_default() - v);
+        let seen = self.robot.sees(p + thrust);
+        answer(action, [ACTUATOR_LIMIT * seen.x / FULL_THRUST, 3.0 * f64::atan2(seen.y, seen.x)]);
     }
 }
 

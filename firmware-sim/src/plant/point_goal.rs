@@ -15,8 +15,8 @@ use armor_core::noise::{Noise, uniform};
 use nalgebra::{Rotation2, Vector2};
 
 use super::lidar::{self, BINS};
-use super::point::{NOSE_AHEAD, NOSE_HALF, Point, RADIUS, SENSORS};
-use super::{Outcome, Plant, Scene, Thing, planar};
+use super::point::{ACTUATOR_LIMIT, NOSE_AHEAD, NOSE_HALF, Point, RADIUS, SENSORS, TOP_SPEED};
+use super::{Outcome, Plant, Scene, Style, Thing, answer, planar};
 use layout::{Draws, GOAL_KEEPOUT, Layout, Taken};
 
 /// Within this distance of its middle, in m, the goal is reached.
@@ -159,6 +159,20 @@ impl Plant for PointGoal {
         let others = [Thing::Vase(self.vase, VASE_HALF), Thing::Goal(self.goal, GOAL_RADIUS)];
         let (robot, heading) = (self.robot.position, Some(self.robot.heading));
         Scene { robot, radius: RADIUS, heading, things: hazards.chain(others).collect() }
+    }
+
+    /// Runs for the goal, turns away from hazards ahead that are nearer than the margin, and
+    /// backs off slowly from what lies behind.
+    fn pilot(&self, style: &Style, action: &mut [f32]) {
+        let mut wanted = self.robot.sees(self.goal).try_normalize(0.0).unwrap_or_default();
+        for seen in self.hazards.iter().map(|hazard| self.robot.sees(*hazard)) {
+            let near = HAZARD_RADIUS + style.margin - seen.norm();
+            if near > 0.0 {
+                wanted -= seen.try_normalize(0.0).unwrap_or_default() * (near / style.margin) * 3.0;
+            }
+        }
+        let pace = if wanted.x > 0.0 { style.pace } else { -style.pace / 3.0 };
+        answer(action, [ACTUATOR_LIMIT * pace / TOP_SPEED, 2.0 * f64::atan2(wanted.y, wanted.x)]);
     }
 }
 

@@ -84,6 +84,24 @@ fn margins_have_their_mean_over_a_mini_batch_or_the_data() {
     assert!((excess / 120.0 - 1.0).abs() < 1e-2, "m / E[m] has mean 1 over the data");
 }
 
+/// The final weights lie between 1, where they start, and what Eq. 10 says of this refresh alone.
+#[test]
+fn the_moving_average_may_be_of_the_final_weights() {
+    let [(alone, ..), (averaged, kept, _)] = [&["reweight_ema=1"][..], &["reweight_averaged=weight"]].map(refreshed);
+    assert_eq!(averaged.combined, kept);
+    for (averaged, alone) in averaged.combined.iter().zip(&alone.combined) {
+        assert!((averaged - (0.7 + 0.3 * alone)).abs() < 1e-6, "{averaged}, {alone}");
+    }
+    assert!(averaged.combined.iter().any(|weight| *weight != 1.0));
+}
+
+/// The larger twin raises what its mean does, and more.
+#[test]
+fn a_mean_of_twins_is_less_cautious_than_the_worse_one() {
+    let [(.., worse), (.., mean)] = [&[][..], &["counterfactual_twins=mean"]].map(refreshed);
+    assert_ne!(worse, mean);
+}
+
 #[test]
 fn a_feasible_mass_replaces_beta() {
     let mut config = Preset::Paper.config("own", 1.0);

@@ -97,25 +97,17 @@ fn an_observation_is_taken_and_told_again() {
     assert!((f64::from(told[7]) - 0.1 * (plant.ball.position.norm() - 7.0)).abs() < 1e-7);
 }
 
-/// Chases a point that goes round the circle clockwise, within the lines less a margin.
-fn scripted(plant: &BallCircle, margin: f64) -> [f32; 2] {
-    let ball = plant.ball;
-    let line = X_LIMIT - margin;
-    let angle = f64::atan2(ball.position.y, ball.position.x) - 0.3;
-    let target = Vector2::new((RADIUS * angle.cos()).clamp(-line, line), RADIUS * angle.sin());
-    let wanted = 3.0 * (target - ball.position).normalize() * 2.0;
-    let push = 2.0 * (wanted - ball.velocity);
-    [push.x.clamp(-1.0, 1.0) as f32, push.y.clamp(-1.0, 1.0) as f32]
-}
-
 fn fly(margin: f64) -> (f64, f64) {
     let task = crate::task::Task::named("ball-circle").unwrap();
     let mut plant = BallCircle::default();
+    let style = Style { pace: 6.0, margin, look: 0.3 };
     let (mut rewards, mut costs) = (0.0, 0.0);
+    let mut action = [0.0; BallCircle::ACTION];
     for seed in 0..20 {
         plant.reset(seed);
         for _ in 0..task.horizon {
-            let outcome = plant.step(&scripted(&plant, margin));
+            plant.pilot(&style, &mut action);
+            let outcome = plant.step(&action);
             rewards += outcome.reward;
             costs += outcome.cost;
         }

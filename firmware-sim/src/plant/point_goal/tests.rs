@@ -122,31 +122,18 @@ fn goal_and_vase_are_found_where_they_are_seen() {
     }
 }
 
-/// Runs for the goal, and turns away from hazards ahead.
-fn scripted(plant: &PointGoal, margin: f64) -> [f32; 2] {
-    let goal = plant.robot.sees(plant.goal);
-    let mut wanted = goal.normalize();
-    for hazard in &plant.hazards {
-        let seen = plant.robot.sees(*hazard);
-        let near = HAZARD_RADIUS + margin - seen.norm();
-        if near > 0.0 {
-            wanted -= seen.normalize() * (near / margin) * 3.0;
-        }
-    }
-    let turn = 2.0 * f64::atan2(wanted.y, wanted.x);
-    let thrust = if wanted.x > 0.0 { 0.03 } else { -0.01 };
-    [thrust, turn.clamp(-1.0, 1.0) as f32]
-}
-
 /// Normalised reward and cost of 20 episodes.
 fn fly(margin: f64) -> (f64, f64) {
     let task = crate::task::Task::named("point-goal").unwrap();
     let mut plant = PointGoal::default();
+    let style = Style { pace: 0.9, margin, look: 0.0 };
     let (mut rewards, mut costs) = (0.0, 0.0);
+    let mut action = [0.0; PointGoal::ACTION];
     for seed in 0..20 {
         plant.reset(seed);
         for _ in 0..task.horizon {
-            let outcome = plant.step(&scripted(&plant, margin));
+            plant.pilot(&style, &mut action);
+            let outcome = plant.step(&action);
             rewards += outcome.reward;
             costs += outcome.cost;
         }
