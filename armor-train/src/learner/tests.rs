@@ -134,7 +134,9 @@ fn the_weights_of_a_batch_have_mean_one_where_asked_once_they_are_in_use() {
     }
     // The mean over the data is not that of a batch.
     let mut learner: Learner<'_, f64> = Learner::new(joint(&options[1..]), &data);
-    (0..4).for_each(|_| drop(learner.step()));
+    for _ in 0..4 {
+        learner.step();
+    }
     let mean = learner.workers.iter().flat_map(|worker| &worker.batch.weight).sum::<f64>() / 140.0;
     assert!((mean - 1.0).abs() > 1e-3, "{mean}");
 }
