@@ -14,7 +14,7 @@ pub const OPTIONS: [(&str, &[Entry]); 6] = [
     (
         "Run",
         &[
-            ("preset", "named set of choices that the other keys started from: `paper` or `quick`"),
+            ("preset", "named set of choices that the other keys started from: `paper`, `quick` or `tuned`"),
             ("data", "path of the recorded data; given by --data"),
             ("task", "task that was recorded, such as ball-run; given by --task"),
             (
@@ -300,7 +300,7 @@ const WIDTH: usize = 80;
 /// Where the meanings of a listing start.
 const INDENT: usize = 6;
 /// The presets of a listing.
-const PRESETS: [Preset; 2] = [Preset::Paper, Preset::Quick];
+const PRESETS: [Preset; 3] = [Preset::Paper, Preset::Quick, Preset::Tuned];
 
 /// What an option means.
 pub fn meaning(key: &str) -> Option<&'static str> {
@@ -328,7 +328,7 @@ pub fn plain(value: &toml::Value) -> String {
 pub fn document() -> String {
     let mut text = String::from(
         "# Options of a training run\n\n\
-         `armor-train fit --preset paper|quick` starts from a preset. The file of `--config FILE.toml` replaces any of \
+         `armor-train fit --preset paper|quick|tuned` starts from a preset. The file of `--config FILE.toml` replaces any of \
          its options, `--set key=value` those of the file, and the flags `--data`, `--task`, `--limit`, `--steps` and \
          `--seed` win over both. \
          `DIR/config.toml` keeps the effective values. `armor-train options` prints this list. \
@@ -337,10 +337,10 @@ pub fn document() -> String {
          the preset `paper` takes what the public code that the paper builds on does.\n",
     );
     for (group, entries) in OPTIONS {
-        let _ = write!(text, "\n## {group}\n\n| key | paper | quick | meaning |\n|---|---|---|---|\n");
+        let _ = write!(text, "\n## {group}\n\n| key | paper | quick | tuned | meaning |\n|---|---|---|---|---|\n");
         for (key, meaning) in entries {
-            let [paper, quick] = values(key);
-            let _ = writeln!(text, "| `{key}` | {paper} | {quick} | {meaning} |");
+            let [paper, quick, tuned] = values(key);
+            let _ = writeln!(text, "| `{key}` | {paper} | {quick} | {tuned} | {meaning} |");
         }
     }
     text.push_str(&ablation());
@@ -372,11 +372,11 @@ pub fn listing() -> String {
     for (group, entries) in OPTIONS {
         let _ = writeln!(text, "{}{group}", if text.is_empty() { "" } else { "\n" });
         for (key, meaning) in entries {
-            let [paper, quick] = values(key);
-            let _ = if paper == quick {
+            let [paper, quick, tuned] = values(key);
+            let _ = if paper == quick && paper == tuned {
                 writeln!(text, "  {key} = {paper}")
             } else {
-                writeln!(text, "  {key} = {paper} (paper), {quick} (quick)")
+                writeln!(text, "  {key} = {paper} (paper), {quick} (quick), {tuned} (tuned)")
             };
             wrap(&mut text, meaning);
         }
@@ -442,6 +442,6 @@ mod tests {
             assert!(listing.contains(&format!("\n  {key} = ")), "{key}");
             assert!(flat.contains(&words(meaning).join(" ")), "{key}");
         }
-        assert!(listing.contains("\n  batch = 512 (paper), 256 (quick)\n"));
+        assert!(listing.contains("\n  batch = 512 (paper), 256 (quick), 256 (tuned)\n"));
     }
 }

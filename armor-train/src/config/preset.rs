@@ -31,6 +31,8 @@ pub enum Preset {
     /// What flies is an average of the actor, and rates fall: without them one
     /// seed in three was unsafe on ball-run.
     Quick,
+    /// What measured better than `quick` (`docs/options.md`).
+    Tuned,
 }
 
 impl Preset {
@@ -39,6 +41,7 @@ impl Preset {
         match self {
             Self::Paper => "paper",
             Self::Quick => "quick",
+            Self::Tuned => "tuned",
         }
     }
 
@@ -151,31 +154,33 @@ impl Preset {
             weight_min: 0.8,
             weight_max: 2.0,
         };
+        let quick = Config {
+            preset: Self::Quick,
+            steps: 9_000,
+            batch: 256,
+            normalize_states: true,
+            hidden: 128,
+            trunk: 128,
+            head: 64,
+            dual_hidden: 64,
+            actor_rate: 5e-4,
+            target_rate: 0.01,
+            policy_gradient: PolicyGradient::OneStep,
+            target_sampler: Sampler::Ddim,
+            target_steps: 5,
+            final_rate: 0.05,
+            actor_average: 0.998,
+            reweight_warmup: 1_000,
+            reweight_interval: 1_000,
+            beta: 10.0,
+            weight_min: 0.1,
+            weight_max: 5.0,
+            ..paper.clone()
+        };
         match self {
             Self::Paper => paper,
-            Self::Quick => Config {
-                preset: Self::Quick,
-                steps: 9_000,
-                batch: 256,
-                normalize_states: true,
-                hidden: 128,
-                trunk: 128,
-                head: 64,
-                dual_hidden: 64,
-                actor_rate: 5e-4,
-                target_rate: 0.01,
-                policy_gradient: PolicyGradient::OneStep,
-                target_sampler: Sampler::Ddim,
-                target_steps: 5,
-                final_rate: 0.05,
-                actor_average: 0.998,
-                reweight_warmup: 1_000,
-                reweight_interval: 1_000,
-                beta: 10.0,
-                weight_min: 0.1,
-                weight_max: 5.0,
-                ..paper
-            },
+            Self::Quick => quick,
+            Self::Tuned => Config { preset: Self::Tuned, ..quick },
         }
     }
 }
@@ -200,7 +205,7 @@ mod tests {
 
     #[test]
     fn presets_pass_their_own_check() {
-        for preset in [Preset::Paper, Preset::Quick] {
+        for preset in [Preset::Paper, Preset::Quick, Preset::Tuned] {
             preset.config("ball-run", 5.0).check().unwrap();
         }
     }

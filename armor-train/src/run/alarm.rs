@@ -86,10 +86,10 @@ impl Cause {
                 "a smaller `critic_rate` or `target_rate`, a smaller `long_cost_discount`, or `bootstrap` in_sample"
             }
             Self::LambdaCap => {
-                "a larger `dual_slack` or a smaller `dual_rate`, or a `kappa_scale` of 1 over the cost limit so that the dual network can tell budgets apart, or `extraction` weighted, which needs no dual"
+                "a larger `dual_slack` or a smaller `dual_rate`, or `kappa_unit` limit so that the dual network can tell budgets apart, or `extraction` weighted, which needs no dual"
             }
             Self::DeadWeights => {
-                "a larger `sigma`, or a larger `short_cost_discount` so that Q_cS can exceed a whole unit of cost"
+                "`counterfactual_reference` realised, a larger `sigma`, or a larger `short_cost_discount` so that Q_cS can exceed a whole unit of cost"
             }
             Self::NotFinite => "a smaller `critic_rate` and `actor_rate`, or a smaller `reward_scale`",
         }

@@ -188,7 +188,7 @@ mod tests {
         }
         text.push_str(
             "\n## provenance.json\n\n\
-             Version of the program, SHA-256 of the data, seed, sizes, and the range of the data's discounted sums of \
+             Version of the program and the commit it was built from, SHA-256 of the data, seed, sizes, and the range of the data's discounted sums of \
              scaled reward and cost from each row to the end of its trajectory, with the discounts of `Q_r` and `Q_cL`: \
              where a sound critic's values lie.\n",
         );

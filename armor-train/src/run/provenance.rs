@@ -14,6 +14,8 @@ use crate::data::{Dataset, ToGo};
 pub struct Provenance {
     /// Version of the program that wrote it last.
     pub version: String,
+    /// The commit it was built from, or `unknown`; "with changes" where files were not as committed.
+    pub commit: String,
     /// SHA-256 of the recorded data, in hexadecimal.
     pub data_sha256: String,
     /// Seed of everything random.
@@ -42,6 +44,7 @@ impl Provenance {
     pub fn new(config: &Config, data: &Dataset) -> Self {
         Self {
             version: env!("CARGO_PKG_VERSION").to_owned(),
+            commit: env!("ARMOR_COMMIT").to_owned(),
             data_sha256: data.sha256().iter().map(|byte| format!("{byte:02x}")).collect(),
             seed: config.seed,
             transitions: data.len(),

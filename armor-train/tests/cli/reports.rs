@@ -44,6 +44,31 @@ fn a_collected_recording_is_sound_and_trains() {
 }
 
 #[test]
+fn every_native_plant_can_be_recorded() {
+    let bench = Bench::new();
+    for (task, steps) in [("ball-circle", 400), ("point-circle", 1000), ("point-goal", 2000)] {
+        let stats = bench.json(&["data", "collect", "--task", task, "--trajectories", "2", "--out", "own.hdf5"]);
+        assert_eq!((&stats["transitions"], &stats["trajectories"]), (&steps.into(), &2.into()), "{task}");
+        assert_eq!(bench.json(&["data", "check", "own.hdf5"])["faults"].as_array().unwrap().len(), 0, "{task}");
+    }
+}
+
+#[test]
+fn an_unfinished_episode_is_dropped_with_a_warning_or_kept_where_a_run_asks_for_it() {
+    let bench = Bench::new();
+    for (unfinished, transitions) in [("drop", 9), ("keep", 12)] {
+        let output = bench.success(&toy(unfinished, 2, &["--set", &format!("unfinished={unfinished}")]));
+        assert_eq!(text(&output.stderr).contains("are dropped"), unfinished == "drop");
+        let origin: serde_json::Value =
+            serde_json::from_slice(&bench.bytes(&format!("{unfinished}/provenance.json"))).unwrap();
+        assert_eq!(origin["transitions"], transitions);
+        let commit = origin["commit"].as_str().unwrap();
+        let hash: String = commit.chars().take_while(char::is_ascii_hexdigit).collect();
+        assert!(commit == "unknown" || hash.len() == 40, "{commit}");
+    }
+}
+
+#[test]
 fn a_sound_file_passes_the_check_and_a_faulty_one_is_told_why() {
     let bench = Bench::new();
     let report = bench.json(&["data", "check", "small.hdf5"]);
