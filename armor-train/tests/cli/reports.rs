@@ -235,7 +235,7 @@ fn the_options_are_listed_with_their_meaning() {
     let bench = Bench::new();
     let plain = bench.success(&["options"]);
     fits_a_terminal(&plain);
-    assert!(text(&plain.stdout).contains("\n  batch = 512 (paper), 256 (quick)\n"));
+    assert!(text(&plain.stdout).contains("\n  batch = 512 (paper), 256 (quick), 256 (tuned)\n"));
     let listed = bench.json(&["options"]);
     bench.success(&toy("run", 1, &[]));
     let config: toml::Table = text(&bench.bytes("run/config.toml")).parse().unwrap();
