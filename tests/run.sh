@@ -26,6 +26,7 @@ if ! { command -v cargo && command -v cc; } >/dev/null; then
 fi
 
 part "workspace" cargo test --workspace --locked --no-fail-fast
+part "power cuts" cargo test -q -p firmware-sim --lib --locked -- --nocapture _operation
 part "embedding" tests/embedding.sh
 part "link" tests/link.sh
 part "bare metal" tests/bare-metal.sh

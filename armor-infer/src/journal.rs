@@ -5,13 +5,14 @@
 //! is taken unless kappa less the worst cost of a step is at least the floor
 //! on flash. After a reset the floor is what is left: the interrupted action
 //! is charged as the worst, and nothing is ever given back. Where no record is
-//! valid, nothing is left. That holds for power cuts; where a bit of the last
-//! record decays, the one before it counts, whose floor is a reserve higher.
+//! valid, nothing is left. A floor is written twice, so that one record may
+//! decay; of an episode's beginning there is one, and where that decays, the
+//! floor of the episode before counts, which is no higher.
 //!
 //! Floors fall in steps of a *reserve*: the larger it is, the fewer records are
-//! written and the more an interrupted episode forfeits. A record is written
-//! once for each reserve of cost that is incurred, and one for each episode,
-//! whose number it holds beside the floor.
+//! written and the more an interrupted episode forfeits. Two records are written
+//! for each reserve of cost that is incurred, and one for each episode, whose
+//! number it holds beside the floor.
 
 use core::ops::Range;
 
@@ -67,7 +68,12 @@ impl<F: NorFlash> Journal<F> {
     /// # Errors
     /// [`LogError::Flash`]; no action may be taken then.
     pub fn begin(&mut self, kappa: Cost) -> Result<(), LogError<F::Error>> {
-        self.append(kappa, self.episode.wrapping_add(1))
+        let floor = self.floor_below(kappa);
+        // Were the record of the beginning to decay, the floor before it would count.
+        if floor < self.floor {
+            self.append_twice(floor)?;
+        }
+        self.append(floor, self.episode.wrapping_add(1))
     }
 
     /// To be called with the kappa of every step before its action is taken:
@@ -79,7 +85,7 @@ impl<F: NorFlash> Journal<F> {
         if self.floor <= kappa.saturating_sub(self.reserve.step) {
             return Ok(());
         }
-        self.append(kappa, self.episode)
+        self.append_twice(self.floor_below(kappa))
     }
 
     /// Gives the flash back.
@@ -87,8 +93,18 @@ impl<F: NorFlash> Journal<F> {
         self.log.into_flash()
     }
 
-    fn append(&mut self, kappa: Cost, episode: u32) -> Result<(), LogError<F::Error>> {
-        let floor = kappa.saturating_sub(self.reserve.step).saturating_sub(self.reserve.ahead);
+    /// The floor that leaves the whole reserve.
+    const fn floor_below(&self, kappa: Cost) -> Cost {
+        kappa.saturating_sub(self.reserve.step).saturating_sub(self.reserve.ahead)
+    }
+
+    /// Lowers the floor of the episode under way.
+    fn append_twice(&mut self, floor: Cost) -> Result<(), LogError<F::Error>> {
+        self.append(floor, self.episode)?;
+        self.append(floor, self.episode)
+    }
+
+    fn append(&mut self, floor: Cost, episode: u32) -> Result<(), LogError<F::Error>> {
         self.log.append([floor.to_raw(), episode])?;
         (self.floor, self.episode) = (floor, episode);
         Ok(())

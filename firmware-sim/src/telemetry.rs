@@ -17,7 +17,7 @@ use crate::harness::Record;
 /// | `reward`, `cost` | what the step brought |
 /// | `rung` | the chain that answered, empty where none did |
 /// | `fault` | what the controller named, empty on an ordinary step |
-/// | `latency_us` | from sample to answer, modelled; 0 on the host |
+/// | `latency_us` | from sample to answer, modelled; 0 on the host, empty where no chain answered |
 /// | `decision` | `policy`, `held`, `fallback` or `down` |
 /// | `injected`, `noticed` | faults that struck, and what the firmware noticed, names with spaces between |
 /// | `x`, `y` | where the robot was at the step's end, in m |

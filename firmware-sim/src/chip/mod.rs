@@ -221,9 +221,9 @@ impl Chip {
         &self.flash.wear()[boot_log::BLOCKS..boot_log::BLOCKS + JOURNAL_BLOCKS]
     }
 
-    /// The bits of a slot's image in flash, for faults; the slot's whole range.
-    pub const fn slot_bits(slot: Slot) -> Range<usize> {
-        8 * slot.start()..8 * (slot.start() + SLOT_BYTES)
+    /// The first bit of a slot in flash.
+    pub const fn slot_bit(slot: Slot) -> usize {
+        8 * slot.start()
     }
 
     /// Reads a chip file.

@@ -127,6 +127,10 @@ impl Run {
         let image = PolicyImage::new_checked(boot.image.as_slice())?;
         let setup = Setup::new(&plan, &image, self.board, self.fault.clone())
             .with_transport(&plan, Duration::from_micros(self.transport_us));
+        if setup.steps_in_time(&plan, &image) == 0 {
+            output.note("no chain ends in time, so the fallback will fly; export in integers, lower");
+            output.note("--rate or choose a faster --board");
+        }
         let mut device = Device::new(chip, &boot);
         let flight = fly_all(&mut device, &plan, &setup)?;
         let mut chip = device.into_chip();

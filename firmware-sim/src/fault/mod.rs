@@ -43,7 +43,7 @@ pub enum FaultKind {
     CostNegative,
     /// A bit of the weights in RAM flips.
     RamFlip,
-    /// A bit of an image in flash flips.
+    /// A bit of an image or of the budget's journal in flash flips.
     FlashFlip,
     /// The controller's clock is slow.
     ClockSlow,

@@ -205,7 +205,7 @@ impl<'s> Firmware<'s> {
         }
         agenda.at(now + next, Event::Sample);
         if robot.injector.strikes(FaultKind::FlashFlip) {
-            robot.flash_flips.push(robot.injector.word(FaultKind::FlashFlip, 1));
+            robot.flash_flips.push([1, 2].map(|draw| robot.injector.word(FaultKind::FlashFlip, draw)));
         }
         if self.sample.is_some() || self.answer.is_some() {
             robot.note(Notice::Skipped);
@@ -260,7 +260,7 @@ impl<'s> Firmware<'s> {
         }
         let latency = self.latency(image, &step).mul_f64(robot.injector.stretch());
         let record = robot.record();
-        (record.rung, record.fault, record.latency) = (step.rung, step.fault, Some(latency));
+        (record.rung, record.fault, record.latency) = (step.rung, step.fault, step.rung.map(|_| latency));
         let (action, decision) = self.decide(&step);
         self.answer = Some((sampled, steps, action, decision));
         agenda.at(now + latency, Event::Answer);

@@ -55,6 +55,7 @@ use crate::flash::FlashFault;
 use crate::flight::{FlightError, FlightPlan, Use, check, episode_seed};
 use crate::memory::AlignedBytes;
 use clock::Agenda;
+use deadline::Deadline;
 use firmware::{End, Event, Firmware, Weights};
 use robot::Robot;
 
@@ -153,6 +154,11 @@ impl Setup {
         self.transport = transport;
         self.reserve.step = worst_cost().saturating_mul(self.blind_steps(plan));
         self
+    }
+
+    /// Steps of the longest chain that ends in time; 0 if there is none.
+    pub fn steps_in_time(&self, plan: &FlightPlan, image: &PolicyImage<'_>) -> usize {
+        Deadline::new(rung_times(image, self, plan.max_steps), self.answer_time(plan)).steps()
     }
 
     /// Time between samples.
@@ -294,10 +300,13 @@ pub fn fly(
         let Some(journal) = journal else { break false };
         let mut flash = journal.into_flash();
         flash.restore_power();
-        for draw in robot.flash_flips.drain(..) {
-            let slot = if draw.is_multiple_of(2) { Slot::A } else { Slot::B };
+        for [choice, bit] in robot.flash_flips.drain(..) {
             let image_bits = 8 * device.memory.as_slice().len() as u32;
-            flash.flip(Chip::slot_bits(slot).start + below(draw, image_bits) as usize);
+            flash.flip(match choice % 3 {
+                0 => Chip::slot_bit(Slot::A) + below(bit, image_bits) as usize,
+                1 => Chip::slot_bit(Slot::B) + below(bit, image_bits) as usize,
+                _ => 8 * JOURNAL.start as usize + below(bit, 8 * (JOURNAL.end - JOURNAL.start)) as usize,
+            });
         }
         device.chip = Chip::with_flash(flash).ok_or(FlightError::Image)?;
         let End::Reset(off) = end else { break true };

@@ -28,7 +28,7 @@ pub struct Record {
     pub rung: Option<usize>,
     /// What the controller named.
     pub fault: Option<Fault>,
-    /// From sample to answer, modelled; none without an answer.
+    /// From sample to answer, modelled; none where no chain answered.
     pub latency: Option<Duration>,
     /// What the robot did.
     pub decision: Decision,

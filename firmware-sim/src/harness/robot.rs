@@ -48,8 +48,8 @@ pub(super) struct Robot<'s> {
     record: Record,
     sink: &'s mut dyn FnMut(&Record),
     pub(super) goals: Vec<(Vector2<f64>, f64)>,
-    /// Draws that say which bits of the flash flip at the next reset.
-    pub(super) flash_flips: Vec<u32>,
+    /// Draws that say what of the flash flips before the next reset, and which bit of it.
+    pub(super) flash_flips: Vec<[u32; 2]>,
     /// Whether the controller is down.
     is_down: bool,
 }

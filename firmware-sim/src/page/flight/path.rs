@@ -33,6 +33,7 @@ fn legend(episode: &RobotEpisode, out: &mut String) {
     let has = |kind: fn(&Thing) -> bool| episode.scene.things.iter().any(kind);
     let entries = [
         (true, "line c0", "M0 5H18", "path"),
+        (true, "other", "M0 5H18", "other episodes"),
         (true, "costly", "M0 5H18", "where it cost"),
         (true, "struck", "M6 2l6 6m0 -6l-6 6", "a fault struck"),
         (has(|thing| matches!(thing, Thing::WallX(_) | Thing::WallY(_))), "danger", "M0 0H18V10H0Z", "beyond a limit"),
