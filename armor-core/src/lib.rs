@@ -35,4 +35,5 @@ pub mod mish;
 pub mod noise;
 pub mod schedule;
 pub mod shape;
+mod turn;
 pub mod units;

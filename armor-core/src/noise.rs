@@ -4,9 +4,11 @@
 //!
 //! The generator is Philox-4x32-10 (Salmon et al., "Parallel random numbers:
 //! as easy as 1, 2, 3", SC 2011); normal draws are by Box and Muller with
-//! `libm` in f32.
+//! the bits of `libm` in f32.
 
 use core::f32::consts::TAU;
+
+use crate::turn::sin_cos;
 
 /// A seeded source of noise, addressed by stream, tick and position.
 ///
@@ -67,10 +69,7 @@ pub const fn uniform(word: u32) -> f32 {
 fn box_muller(a: u32, b: u32) -> [f32; 2] {
     // 1 - u lies in (0, 1], so the logarithm is finite.
     let radius = libm::sqrtf(-2.0 * libm::logf(1.0 - uniform(a)));
-    // Never above a turn; `min` tells the compiler, which else keeps the code
-    // and the stack that reduce large angles.
-    let angle = f32::from_bits((TAU * uniform(b)).to_bits().min(TAU.to_bits()));
-    let (sin, cos) = libm::sincosf(angle);
+    let (sin, cos) = sin_cos(TAU * uniform(b));
     [radius * cos, radius * sin]
 }
 

@@ -111,8 +111,8 @@ fn a_budget_that_is_spent_stays_at_zero() {
 }
 
 /// An episode of the point robot in MuJoCo, flown by a controller of another
-/// process: what the plant prints of it, and its recording.
-fn recorded_with(controller: &[&str], folder: &Path) -> (Vec<u8>, Vec<u8>) {
+/// process: its rewards and costs as the plant prints them, and its recording.
+fn recorded_with(controller: &[&str], folder: &Path) -> (String, Vec<u8>) {
     let mut controller = Command::new(env!("CARGO_BIN_EXE_firmware-sim"))
         .current_dir(folder)
         .args(controller)
@@ -134,7 +134,9 @@ fn recorded_with(controller: &[&str], folder: &Path) -> (Vec<u8>, Vec<u8>) {
     controller.wait().unwrap();
     let flown = flown.unwrap();
     assert!(flown.status.success(), "{}", String::from_utf8_lossy(&flown.stderr));
-    (flown.stdout, fs::read(folder.join("flown.hdf5")).unwrap())
+    // What follows is the time it took.
+    let told = String::from_utf8(flown.stdout).unwrap().lines().next().unwrap().to_owned();
+    (told, fs::read(folder.join("flown.hdf5")).unwrap())
 }
 
 /// Hardware in the loop: 500 steps of MuJoCo, where an action that differs in a
@@ -148,6 +150,6 @@ fn emulated_cortex_m4_flies_mujoco_as_this_host_does() {
     fs::write(folder.path().join("policy.armor"), Parts::random(task.name, shape, 1).with_golden().bytes()).unwrap();
     let host = recorded_with(&["serve", "policy.armor"], folder.path());
     let machine = recorded_with(&["mcu", "policy.armor", "--machine", "mps2-an386"], folder.path());
-    assert!(String::from_utf8_lossy(&host.0).contains("\"episode\": 0"));
+    assert!(host.0.contains("\"episode\": 0"), "{}", host.0);
     assert!(host == machine, "the emulated controller flew otherwise than the host's");
 }

@@ -50,7 +50,8 @@ fn blocks<'w, 'o, const B: usize>(
     let (blocks, rest) = out.as_chunks_mut::<B>();
     for block in blocks {
         let mut sums = *block;
-        let rows = weights.chunks(stride).filter_map(<[f32]>::first_chunk::<B>);
+        // It is at least 1; `max` tells the compiler, which else keeps a panic.
+        let rows = weights.chunks(stride.max(1)).filter_map(<[f32]>::first_chunk::<B>);
         for (x, row) in x.iter().zip(rows) {
             for (sum, weight) in sums.iter_mut().zip(row) {
                 *sum += x * weight;

@@ -58,7 +58,8 @@ fn sum_groups(weights: &[i8], codes: &[i16], bits: u32, sums: &mut [[i32; BLOCK]
     // block of sums, and a group is the bytes of the columns and those skipped.
     unsafe { sum(weights.as_ptr(), &plan, sums.as_mut_ptr().cast()) };
     if !tail.is_empty() {
-        for (sums, group) in sums.iter_mut().zip(weights.chunks_exact(group)) {
+        // It is not 0 where there are columns; `max` tells the compiler, which else keeps a panic.
+        for (sums, group) in sums.iter_mut().zip(weights.chunks_exact(group.max(1))) {
             if let Some(block) = group.last_chunk() {
                 integer::add_block(block, tail, sums);
             }
