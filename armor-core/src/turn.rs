@@ -7,9 +7,13 @@
 
 use core::f64::consts::FRAC_PI_2;
 
-/// The largest angles that count from one axis, in quarter turns from the first.
-/// They are `f32::from_bits` of 3F490FDA, 4016CBE3, 407B53D1 and 40AFEDDF.
-const EIGHTHS: [f32; 4] = [0.785_398_1, 2.356_194_3, 3.926_990_7, 5.497_787];
+/// The largest angles that count from one axis, an eighth of a turn beyond it.
+const EIGHTHS: [f32; 4] = [
+    f32::from_bits(0x3F49_0FDA),
+    f32::from_bits(0x4016_CBE3),
+    f32::from_bits(0x407B_53D1),
+    f32::from_bits(0x40AF_EDDF),
+];
 
 /// Sine and cosine of `angle`, from 0 to 2 pi.
 pub(crate) fn sin_cos(angle: f32) -> (f32, f32) {
