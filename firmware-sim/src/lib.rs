@@ -52,6 +52,7 @@ pub mod plant;
 mod recorded;
 pub mod reference;
 pub mod simulator;
+pub mod sized;
 pub mod summary;
 pub mod task;
 pub mod telemetry;

@@ -1,12 +1,13 @@
 //! Boards that may fly a policy, and a model of how long an action takes on them.
 //!
-//! Nothing here was measured on a board: instructions for each kind of work
-//! ([`Work`]) come from emulated cores, what an instruction costs from published
-//! benchmarks ([`mod@model`]). Every time is *modelled* and is labelled so.
+//! Nothing here was measured on a board: the instructions of an action's work
+//! ([`Work`], [`mod@model`]) come from emulated cores, what an instruction costs
+//! from manuals and published benchmarks (`cost.rs`). Every time is *modelled* and is labelled so.
 //!
 //! Words: *work* is what an action computes, counted by kind; a *cycle* is one
 //! of the core's clock; a *stall* is a cycle in which the core waits for weights.
 
+mod cost;
 pub mod model;
 mod work;
 

@@ -1,21 +1,26 @@
 //! From work to instructions, cycles and time: modelled, not measured.
 //!
 //! ```text
-//! instructions = sum over kinds of work: count x instructions of one
-//! cycles       = instructions x cycles of one + bytes of weights x stalls of one
-//! time         = cycles / clock
+//! instructions of a class = sum over features of the work: count x share
+//! cycles                  = instructions x cycles of their class, calibrated
+//!                           + bytes of weights x stalls of one
+//! time                    = cycles / clock
 //! ```
 //!
-//! Provisional: instructions of a multiply-accumulate are those of plain Rust
-//! loops under QEMU 7.2; cycles of an instruction are what MLPerf Tiny results
-//! (anomaly detection, fully connected layers) divided by the instructions of
-//! CMSIS-NN's kernels come to.
+//! The shares are solved from the instructions that emulated cores executed for
+//! actions of several sizes ([`crate::mcu::record`]), so they are exact at
+//! those sizes. What an instruction costs is in [`super::cost`].
 
+use std::collections::BTreeMap;
 use std::time::Duration;
 
-use armor_core::image::{PolicyImage, Precision};
+use armor_core::image::{Layout, PolicyImage, Precision};
+use nalgebra::{SMatrix, SVector};
 
 use super::{Board, Core, Work};
+use crate::mcu::record::{self, Action, Record};
+use crate::mcu::{Class, SIZES};
+use crate::sized;
 
 /// What an action takes on a board, modelled.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,41 +35,20 @@ pub struct Modelled {
     pub worst: Duration,
 }
 
-/// Instructions of one operation of each kind.
-struct Instructions {
-    mac: f64,
-    activation: f64,
-    rescale: f64,
-    entry: f64,
-    normal: f64,
-    step: f64,
-}
-
 impl Board {
     /// What an action along a rung takes; none if the image has no such rung.
     pub fn action(&self, image: &PolicyImage<'_>, rung: usize) -> Option<Modelled> {
-        Some(self.modelled(&Work::of(image, rung)?, image.manifest().precision))
+        let manifest = image.manifest();
+        Some(self.modelled(&Work::of(image, rung)?, manifest.precision, manifest.layout))
     }
 
     /// What work takes.
-    pub fn modelled(&self, work: &Work, precision: Precision) -> Modelled {
-        let main = instructions(self.core, precision);
-        let float = instructions(self.core, Precision::F32);
-        let count = |number: u64, each: f64| number as f64 * each;
-        let in_precision = count(work.macs, main.mac)
-            + count(work.activations, main.activation)
-            + count(work.rescales, main.rescale)
-            + count(work.entries, main.entry)
-            + count(work.steps, main.step);
-        let in_float = count(work.float_macs, float.mac)
-            + count(work.float_activations, float.activation)
-            + count(work.normals, float.normal);
-        let cycles = in_precision * cycles_per_instruction(self.core, precision)
-            + in_float * cycles_per_instruction(self.core, Precision::F32)
-            + count(work.weight_bytes, self.flash.stalls_per_byte);
+    pub fn modelled(&self, work: &Work, precision: Precision, layout: Layout) -> Modelled {
+        let executed = executed(self.core, precision, layout, work);
+        let cycles = self.core.cycles(&executed, precision) + work.weight_bytes as f64 * self.flash.stalls_per_byte;
         let time = cycles / f64::from(self.clock_hz);
         Modelled {
-            instructions: in_precision + in_float,
+            instructions: executed.instructions(),
             cycles,
             time: Duration::from_secs_f64(time),
             worst: Duration::from_secs_f64(time * (1.0 + self.jitter)),
@@ -72,43 +56,47 @@ impl Board {
     }
 }
 
-/// Instructions of each kind of work, by core and precision.
-const fn instructions(core: Core, precision: Precision) -> Instructions {
-    // A soft-float addition or multiplication of compiler-builtins is about 45 instructions.
-    let mac = match (core, precision) {
-        (Core::M4F | Core::M33, Precision::F32) => 3.9,
-        (Core::M7, Precision::F32) => 2.9,
-        (Core::M0Plus | Core::Rv32Imc, Precision::F32) => 95.0,
-        (Core::M7, _) => 5.35,
-        (_, _) => 4.84,
+/// What instructions are counted by.
+const FEATURES: usize = 5;
+type Features = SVector<f64, FEATURES>;
+
+fn features(work: &Work) -> Features {
+    Features::from([work.macs as f64, work.activations as f64, work.normals as f64, work.steps as f64, 1.0])
+}
+
+/// The instructions of work on a core, by class.
+fn executed(core: Core, precision: Precision, layout: Layout, work: &Work) -> Record {
+    let records = record::recorded();
+    let machine = core.machine();
+    let record = |layout: Layout, (hidden, steps): (u16, u16)| {
+        let format = record::format_name(precision, layout).into();
+        records.get(&Action { machine: machine.into(), format, hidden, steps })
     };
-    let has_float = matches!(core, Core::M4F | Core::M7 | Core::M33);
-    match precision {
-        // One exponential and one division a unit; soft float about 20 operations of 45.
-        Precision::F32 => {
-            let soft = if has_float { 1.0 } else { 15.0 };
-            let [activation, entry, normal] = [60.0 * soft, 12.0 * soft, 150.0 * soft];
-            Instructions { mac, activation, rescale: 0.0, entry, normal, step: 400.0 }
-        }
-        Precision::Int16x8 | Precision::Int8 => {
-            Instructions { mac, activation: 24.0, rescale: 12.0, entry: 20.0, normal: 0.0, step: 400.0 }
-        }
+    // Cores without 16-bit SIMD have no record of pairs: they read them by plain loops, as they do rows.
+    let layout = if record(layout, SIZES[0]).is_some() { layout } else { Layout::Rows };
+    let sizes: [(u16, u16); FEATURES] = std::array::from_fn(|size| SIZES[size]);
+    let counted = sizes.map(|size| record(layout, size).cloned().unwrap_or_default());
+    let rows = sizes.map(|(hidden, steps)| features(&sized_work(hidden, precision, steps)).transpose());
+    let Some(inverse) = SMatrix::<f64, FEATURES, FEATURES>::from_rows(&rows).try_inverse() else {
+        return Record::default();
+    };
+    // An inverse has a row a feature: their shares of what was counted.
+    let predicted = |value: &dyn Fn(&Record) -> f64| {
+        let counts = Features::from(std::array::from_fn(|size| value(&counted[size])));
+        (inverse * counts).dot(&features(work)).max(0.0)
+    };
+    let of_class = |class: Class| predicted(&|record| record.classes.get(&class).copied().unwrap_or_default());
+    Record {
+        classes: Class::ALL.map(|class| (class, of_class(class))).into_iter().collect::<BTreeMap<_, _>>(),
+        loaded_registers: predicted(&|record| record.loaded_registers),
     }
 }
 
-/// Cycles of an instruction: 9.5, 5.5 cycles a MAC over 5.08 instructions in
-/// single precision (M4F, M7), and 2.12, 1.28, 1.98 over 2.07 in 8 bits (M4F,
-/// M7, M33). For the other cores nothing was published that could be divided
-/// so: one cycle, and a quarter for branches and loads.
-const fn cycles_per_instruction(core: Core, precision: Precision) -> f64 {
-    match (core, precision) {
-        (Core::M4F | Core::M33, Precision::F32) => 1.87,
-        (Core::M7, Precision::F32) => 1.08,
-        (Core::M4F, _) => 1.02,
-        (Core::M7, _) => 0.62,
-        (Core::M33, _) => 0.96,
-        (Core::M0Plus | Core::Rv32Imc, _) => 1.25,
-    }
+/// The work of an action of a sized policy; only DDPM draws noise on its way.
+fn sized_work(hidden: u16, precision: Precision, steps: u16) -> Work {
+    let shape = sized::shape(hidden);
+    let noisy = if steps == shape.steps { steps - 1 } else { 0 };
+    Work::new(&shape, precision, steps, noisy)
 }
 
 #[cfg(test)]
@@ -132,14 +120,34 @@ mod tests {
         }
     }
 
-    /// 1000 multiply-accumulates and nothing else, by hand.
+    /// The last size is recorded and takes no part in the shares.
     #[test]
-    fn cycles_are_instructions_and_stalls() {
-        let flash = Flash { bytes: 0, stalls_per_byte: 0.5 };
-        let board = Board { flash, jitter: 0.1, ..*Board::named("stm32f407").unwrap() };
-        let modelled = board.modelled(&Work { macs: 1000, weight_bytes: 4000, ..Work::default() }, Precision::F32);
-        assert_eq!(modelled.instructions, 3900.0);
-        assert!((modelled.cycles - (3900.0 * 1.87 + 2000.0)).abs() < 1e-6);
-        assert!((modelled.worst.as_secs_f64() / modelled.time.as_secs_f64() - 1.1).abs() < 1e-3);
+    fn a_size_that_was_not_solved_for_is_predicted_to_two_per_cent() {
+        let held_out = SIZES[FEATURES];
+        for (Action { machine, format, hidden, steps }, record) in record::recorded().iter() {
+            let (hidden, steps) = (*hidden, *steps);
+            let formats = [
+                (Precision::F32, Layout::Rows),
+                (Precision::Int16x8, Layout::Rows),
+                (Precision::Int16x8, Layout::Paired),
+                (Precision::Int8, Layout::Rows),
+                (Precision::Int8, Layout::Paired),
+            ];
+            let core = Core::ALL.into_iter().find(|core| core.machine() == machine);
+            let Some(core) = core.filter(|_| (hidden, steps) == held_out) else { continue };
+            let (precision, layout) = formats.into_iter().find(|&(p, l)| record::format_name(p, l) == *format).unwrap();
+            let predicted = executed(core, precision, layout, &sized_work(hidden, precision, steps)).instructions();
+            let error = predicted / record.instructions() - 1.0;
+            assert!(error.abs() < 0.02, "{machine}, {format}: {error}");
+        }
+    }
+
+    #[test]
+    fn stalls_are_added_for_each_byte_of_weights() {
+        let stm = Board::named("stm32f407").unwrap();
+        let waits = |stalls_per_byte| Board { flash: Flash { bytes: 0, stalls_per_byte }, ..*stm };
+        let work = sized_work(64, Precision::Int8, 1);
+        let cycles = |stalls| waits(stalls).modelled(&work, Precision::Int8, Layout::Rows).cycles;
+        assert!((cycles(0.5) - cycles(0.0) - 0.5 * work.weight_bytes as f64).abs() < 1e-6);
     }
 }

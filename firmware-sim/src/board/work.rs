@@ -1,7 +1,8 @@
 //! What an action computes, counted by kind from an image's shape and chain.
 
-use armor_core::image::PolicyImage;
+use armor_core::image::{PolicyImage, Precision};
 use armor_core::schedule::ChainStep;
+use armor_core::shape::Shape;
 
 /// The operations of one action along a rung.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -29,13 +30,19 @@ pub struct Work {
 impl Work {
     /// The work of an action along rung `rung`; none if the image has no such rung.
     pub fn of(image: &PolicyImage<'_>, rung: usize) -> Option<Self> {
-        let (manifest, shape) = (image.manifest(), &image.manifest().shape);
-        let steps = u64::from(manifest.rungs.get(rung)?.steps);
+        let manifest = image.manifest();
+        let steps = manifest.rungs.get(rung)?.steps;
+        let noisy = |step: &ChainStep| step.sigma != 0.0;
+        let noisy_steps = image.sections().chain(manifest, rung).filter(noisy).count() as u16;
+        Some(Self::new(&manifest.shape, manifest.precision, steps, noisy_steps))
+    }
+
+    /// The work of `steps` calls of a network, `noisy_steps` of which draw noise.
+    pub fn new(shape: &Shape, precision: Precision, steps: u16, noisy_steps: u16) -> Self {
+        let (steps, noisy_steps) = (u64::from(steps), u64::from(noisy_steps));
         let [s, a, h, k, e] =
             [shape.state, shape.action, shape.hidden, shape.kappa_hidden, shape.kappa_embedding].map(u64::from);
-        let is_integer = manifest.precision.code_bits().is_some();
-        let noisy = |step: &ChainStep| step.sigma != 0.0;
-        let noisy_steps = image.sections().chain(manifest, rung).filter(noisy).count() as u64;
+        let is_integer = precision.code_bits().is_some();
 
         let embedding = k + k * k + k * e;
         let context = (s + e) * h;
@@ -43,7 +50,7 @@ impl Work {
         let output = if is_integer { 2 * h * a } else { h * a };
         let step = a * h + 2 * h * h + output;
         let weight = if is_integer { 1 } else { 4 };
-        Some(Self {
+        Self {
             macs: context + steps * step + if is_integer { 0 } else { embedding },
             float_macs: if is_integer { embedding } else { 0 },
             activations: steps * 3 * h + if is_integer { 0 } else { 2 * k },
@@ -53,7 +60,7 @@ impl Work {
             normals: a * (1 + noisy_steps),
             steps,
             weight_bytes: weight * (context + steps * step) + 4 * embedding,
-        })
+        }
     }
 }
 

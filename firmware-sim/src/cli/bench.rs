@@ -10,6 +10,7 @@ use armor_core::units::CostLimit;
 use armor_infer::{Kernel, LoadError, Policy};
 use serde::Serialize;
 
+use super::boards;
 use super::output::{CommandResult, Output};
 use super::round_trip::{self, RoundTrips};
 use super::sampler_name;
@@ -35,6 +36,10 @@ pub(super) struct Bench {
     /// standard streams, on the longest rung of each image and on its shortest.
     #[arg(long)]
     link: bool,
+    /// What an action takes on a board, or on `all` of them, in place of this
+    /// host: modelled, not measured.
+    #[arg(long, value_name = "B", value_parser = boards::boards, conflicts_with = "link")]
+    board: Option<boards::Boards>,
 }
 
 #[derive(Serialize)]
@@ -65,6 +70,9 @@ struct Row {
 
 impl Bench {
     pub(super) fn run(self, output: Output) -> CommandResult {
+        if let Some(boards) = &self.board {
+            return boards::report(boards, &self.images, output);
+        }
         let files = self.images.iter().map(|path| ImageFile::read(path)).collect::<Result<Vec<_>, _>>()?;
         let images = files.iter().map(ImageFile::image).collect::<Result<Vec<_>, NotAnImage>>()?;
         output.note(format_args!("timing {} actions of every rung on every kernel", ROUNDS * ACTIONS));

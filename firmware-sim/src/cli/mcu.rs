@@ -48,9 +48,9 @@ pub(super) struct Mcu {
 
 /// The machines of an argument.
 #[derive(Clone, Debug)]
-struct Machines(Vec<&'static Machine>);
+pub(super) struct Machines(pub(super) Vec<&'static Machine>);
 
-fn machines(name: &str) -> Result<Machines, String> {
+pub(super) fn machines(name: &str) -> Result<Machines, String> {
     match name {
         "all" => Ok(Machines(MACHINES.iter().collect())),
         name => Machine::named(name).map(|machine| Machines(vec![machine])),

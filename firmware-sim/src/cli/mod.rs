@@ -1,6 +1,8 @@
 //! The command line: `firmware-sim COMMAND`.
 
 mod bench;
+mod boards;
+mod budgets;
 mod flash;
 mod inspect;
 mod mcu;
@@ -47,6 +49,7 @@ enum Command {
     Bench(bench::Bench),
     Serve(serve::Serve),
     Mcu(mcu::Mcu),
+    Budgets(budgets::Budgets),
 }
 
 /// Runs the command of the process's arguments.
@@ -64,6 +67,7 @@ pub fn main() -> ExitCode {
         Command::Bench(command) => command.run(output),
         Command::Serve(command) => command.run(output),
         Command::Mcu(command) => command.run(output),
+        Command::Budgets(command) => command.run(output),
     })
 }
 

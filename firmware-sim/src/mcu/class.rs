@@ -56,6 +56,24 @@ const BEGINNINGS: [(Class, &[&str]); 15] = [
 ];
 
 impl Class {
+    /// Every class.
+    pub const ALL: [Self; 14] = [
+        Self::Load,
+        Self::LoadMultiple,
+        Self::Store,
+        Self::Branch,
+        Self::Multiply,
+        Self::SimdMac,
+        Self::Extend,
+        Self::Divide,
+        Self::FloatMultiply,
+        Self::FloatMac,
+        Self::FloatDivide,
+        Self::Float,
+        Self::Vector,
+        Self::Integer,
+    ];
+
     /// The class of an instruction as QEMU's disassembler writes it. What it
     /// does not know are the vectors of a Cortex-M55; nothing else is left out.
     pub fn of(text: &str) -> Self {
@@ -63,6 +81,15 @@ impl Class {
         let fits = |beginnings: &[&str]| beginnings.iter().any(|beginning| mnemonic.starts_with(beginning));
         let rule = BEGINNINGS.iter().find(|(_, beginnings)| fits(beginnings));
         rule.map_or(Self::Integer, |(class, _)| *class)
+    }
+
+    /// Registers that an instruction of this class loads together, by its list in braces.
+    pub fn loaded_registers(self, text: &str) -> u32 {
+        let list = text.split_once('{').and_then(|(_, rest)| rest.split_once('}'));
+        match (self, list) {
+            (Self::LoadMultiple, Some((list, _))) => list.split(',').count() as u32,
+            _ => 0,
+        }
     }
 
     /// As tables name it.
@@ -89,6 +116,19 @@ impl Class {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_load_of_several_registers_names_them() {
+        for (text, registers) in [
+            ("ldm.w r0!, {r2, r3, r4, r5}", 4),
+            ("vldmia r1!, {s24}", 1),
+            ("pop {r4, pc}", 2),
+            ("ldr r0, [r1]", 0),
+            ("stm r0!, {r1, r2}", 0),
+        ] {
+            assert_eq!(Class::of(text).loaded_registers(text), registers, "{text}");
+        }
+    }
 
     #[test]
     fn a_mnemonic_is_of_its_class_on_arm_and_on_riscv() {

@@ -21,6 +21,8 @@ pub struct Instructions {
     pub total: f64,
     /// By class.
     pub classes: BTreeMap<Class, f64>,
+    /// Registers that loads of several registers loaded.
+    pub loaded_registers: f64,
     /// By function, the most first.
     pub functions: Vec<(String, f64)>,
     /// A number that all bits of the actions enter.
@@ -34,6 +36,8 @@ pub struct Instructions {
 struct Executed {
     executions: u64,
     class: Class,
+    /// Registers that it loads, if it loads several.
+    loaded_registers: u32,
 }
 
 type Counts = BTreeMap<u64, Executed>;
@@ -71,6 +75,7 @@ pub fn count(
         let mean = executed.executions.saturating_sub(before(address)) as f64 / f64::from(actions);
         instructions.total += mean;
         *instructions.classes.entry(executed.class).or_default() += mean;
+        instructions.loaded_registers += mean * f64::from(executed.loaded_registers);
         *functions.entry(firmware.function(*address).unwrap_or("start-up")).or_default() += mean;
     }
     instructions.classes.retain(|_, count| *count > 0.0);
@@ -97,7 +102,9 @@ fn parse(text: &str) -> Result<Counts, McuError> {
         let mut parts = line.splitn(4, ' ');
         let mut number = || parts.next()?.parse::<u64>().ok();
         let (address, executions, _size) = (number()?, number()?, number()?);
-        Some((address, Executed { executions, class: Class::of(parts.next().unwrap_or_default()) }))
+        let text = parts.next().unwrap_or_default();
+        let class = Class::of(text);
+        Some((address, Executed { executions, class, loaded_registers: class.loaded_registers(text) }))
     };
     let bad = |bad: &str| McuError::Count { what: format!("no count: {bad}") };
     text.lines().map(|text| line(text).ok_or_else(|| bad(text))).collect()

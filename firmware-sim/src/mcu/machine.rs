@@ -54,6 +54,11 @@ impl Machine {
         command
     }
 
+    /// Whether its core has the 16-bit SIMD that reads weights in pairs of rows.
+    pub fn has_dsp(&self) -> bool {
+        ["Cortex-M4F", "Cortex-M7", "Cortex-M33", "Cortex-M55"].contains(&self.core)
+    }
+
     /// Debian's package of the emulator.
     pub(super) const fn package(&self) -> &'static str {
         match self.emulator.as_bytes() {

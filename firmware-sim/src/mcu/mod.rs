@@ -10,6 +10,7 @@
 //! | `bridge.rs` | its UART as a line for a plant of another program |
 //! | `count.rs`, `class.rs` | instructions of an action, by function and by class |
 //! | `survey.rs` | all of it, for a policy and a machine |
+//! | [`record`], `budget.rs` | what actions took, recorded, and held to it |
 //!
 //! What is counted are instructions, never time: an emulator knows no cycles.
 //!
@@ -17,6 +18,7 @@
 //! memory that stands for the flash in which the policy lies.
 
 mod bridge;
+mod budget;
 mod class;
 mod count;
 mod emulator;
@@ -24,9 +26,11 @@ mod episode;
 mod error;
 mod firmware;
 mod machine;
+pub mod record;
 mod survey;
 
 pub use bridge::bridge;
+pub use budget::{Change, SIZES, TOLERANCE, changes, measure};
 pub use class::Class;
 pub use count::{Instructions, count};
 pub use emulator::{Flashed, Running, Told};
