@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Proves the controller on microcontrollers: the bare-metal firmware of
 # firmware-sim/mcu is built for seven of them, in Rust, and for one in C, and
-# under QEMU each flies as this host does, bit for bit, within small memories.
+# under QEMU each flies as this host does, bit for bit, within small memories
+# and the instructions that are recorded for it (firmware-sim budgets).
 # Where the simulators of tests/link.sh are there, the emulated Cortex-M4F flies
 # MuJoCo's point robot, too.
 #
@@ -34,6 +35,8 @@ firmware-sim/mcu/build.sh all
 
 export ARMOR_FIRMWARE=$PWD/target/mcu
 cargo test --locked -p armor-tests --test across -- --ignored --nocapture mcu
+
+cargo run --quiet --locked -p firmware-sim -- budgets --machine all --firmware "$ARMOR_FIRMWARE"
 
 export ARMOR_SIMULATORS=${ARMOR_SIMULATORS:-$PWD/target/simulators}
 if [[ -x $ARMOR_SIMULATORS/bin/python ]]; then

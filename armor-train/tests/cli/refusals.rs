@@ -21,6 +21,7 @@ fn wrong_arguments_are_bad_usage() {
     assert!(bench.misuse(&[&["data", "calibrate", "x"], &task[..]].concat()).contains("no task is called ball-jump"));
     assert!(bench.misuse(&["evaluate", "run", "--task", "ball-run", "--episodes", "0"]).contains("--episodes"));
     assert!(bench.misuse(&["export", "run", "-o", "x", "--precision", "int4"]).contains("possible values: f32"));
+    assert!(bench.misuse(&["export", "run", "-o", "x", "--layout", "paired"]).contains("f32 have one layout"));
     assert_eq!(bench.names("."), ["small.hdf5"]);
 }
 

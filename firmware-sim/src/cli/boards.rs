@@ -2,7 +2,7 @@
 //! boards, modelled.
 
 use std::fmt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use armor_core::image::{Layout, PolicyImage, Precision};
 use serde::Serialize;
@@ -69,7 +69,7 @@ pub(super) fn report(Boards(boards): &Boards, paths: &[PathBuf], output: Output)
 }
 
 impl Report {
-    fn add(&mut self, path: &PathBuf, image: &PolicyImage<'_>, boards: &[&'static Board]) {
+    fn add(&mut self, path: &Path, image: &PolicyImage<'_>, boards: &[&'static Board]) {
         let manifest = image.manifest();
         let weights = if manifest.layout == Layout::Paired { ", weights in pairs" } else { "" };
         let title = format!("{}, {:?}{weights}, {} bytes", path.display(), manifest.precision, image.bytes().len());
@@ -83,7 +83,7 @@ impl Report {
                 let modelled_ms = 1e3 * action.time.as_secs_f64();
                 times.push(modelled_ms);
                 self.modelled.push(Modelled {
-                    image: path.clone(),
+                    image: path.into(),
                     precision: manifest.precision,
                     layout: manifest.layout,
                     board: board.name,

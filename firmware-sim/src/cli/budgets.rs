@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::fmt;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use serde::Serialize;
@@ -17,7 +17,8 @@ use crate::mcu::{Change, Firmware, SIZES, changes, measure};
 const CHECKED: [usize; 2] = [0, 2];
 
 /// Hold the instructions of an action on emulated microcontrollers to what is
-/// recorded, for each number format: a change beyond 1 % fails.
+/// recorded, for each number format: a change beyond 1 % fails. Kernels in
+/// assembly are compared with the portable ones on the machine before.
 ///
 /// Random policies are counted, of the paper's size (hidden 256, 20 steps) and
 /// of a smaller one (hidden 128, 5 steps). The firmware is built first where
@@ -27,6 +28,9 @@ pub(super) struct Budgets {
     /// The emulated board, or `all` of them.
     #[arg(long, value_name = "M", value_parser = machines, default_value = "all")]
     machine: Machines,
+    /// A folder with built firmware, MACHINE.elf, in place of building it.
+    #[arg(long, value_name = "DIR")]
+    firmware: Option<PathBuf>,
     /// Record what was counted, in firmware-sim/mcu/instructions.csv, in place
     /// of comparing; the model of boards is made of it.
     #[arg(long)]
@@ -59,7 +63,10 @@ impl Budgets {
         let mut counted = BTreeMap::new();
         for machine in self.machine.0 {
             output.note(format_args!("{}: firmware", machine.name));
-            let firmware = Firmware::build(machine)?;
+            let firmware = match &self.firmware {
+                None => Firmware::build(machine)?,
+                Some(folder) => Firmware::read(&folder.join(format!("{}.elf", machine.name)))?,
+            };
             output.note(format_args!("{}: counting", machine.name));
             counted.extend(measure(machine, &firmware, &sizes, Duration::from_secs(self.patience))?);
         }

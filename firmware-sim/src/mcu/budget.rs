@@ -22,6 +22,9 @@ pub const TOLERANCE: f64 = 0.01;
 /// The last is for a test of the model that the others make.
 pub const SIZES: [(u16, u16); 6] = [(256, 20), (128, 20), (128, 5), (64, 5), (64, 1), (256, 5)];
 
+/// Compares a machine's kernels with the portable ones, 300 rounds of each.
+const KERNELS: &str = "kernels 300";
+
 /// An action whose instructions are not what is recorded.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Change {
@@ -44,10 +47,10 @@ fn formats(machine: &Machine) -> Vec<(Precision, Layout)> {
     formats
 }
 
-/// Counts the actions of a machine, of `sizes`.
+/// Checks the kernels of a machine, then counts its actions of `sizes`.
 ///
 /// # Errors
-/// [`McuError`]
+/// [`McuError`]; among them that a kernel's bits differ from the portable one's.
 pub fn measure(
     machine: &'static Machine,
     firmware: &Firmware,
@@ -60,6 +63,9 @@ pub fn measure(
             let bytes = sized::policy(sized::shape(hidden), precision, layout);
             let flyable = host::check(bytes.as_slice())?;
             let flashed = Flashed::new(machine, firmware, flyable.image.bytes())?;
+            if records.is_empty() && machine.has_dsp() {
+                flashed.run(KERNELS, patience)?;
+            }
             let counted = count(&flashed, firmware, steps.into(), 1, patience)?;
             let action =
                 Action { machine: machine.name.into(), format: format_name(precision, layout).into(), hidden, steps };
