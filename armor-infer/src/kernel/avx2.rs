@@ -13,6 +13,7 @@ use armor_core::fixed::{
 };
 
 use super::{float, integer};
+use crate::denoiser::front;
 
 /// Single-precision numbers in a register.
 const LANES: usize = 8;
@@ -169,6 +170,8 @@ fn sum_in_chunks<T, const N: usize>(
     add: impl Fn(__m256i, &[i8; N], &[T; N]) -> __m256i,
 ) {
     let stride = codes.len().max(1);
+    // Sums beyond the weights must not take a block from rows that have some.
+    let sums = front(sums, (weights.len() / stride).min(sums.len()));
     let tail = codes.get(chunks.len() * N..).unwrap_or_default();
     let (blocks, rest) = sums.as_chunks_mut::<ROWS>();
     let mut groups = weights.chunks_exact(ROWS * stride);

@@ -14,6 +14,7 @@ use armor_core::fixed::{
 
 use super::avx2::Avx2;
 use super::{float, integer};
+use crate::denoiser::front;
 
 /// Single-precision numbers in a register.
 const LANES: usize = 16;
@@ -179,6 +180,8 @@ fn sum_in_chunks<T, const N: usize>(
     add: impl Fn(__m512i, &[T; N], *const i8, u64) -> __m512i,
 ) {
     let stride = stride.max(1);
+    // Sums beyond the weights must not take a block from rows that have some.
+    let sums = front(sums, (weights.len() / stride).min(sums.len()));
     let (blocks, rest) = sums.as_chunks_mut::<ROWS>();
     let groups = weights.chunks_exact(ROWS * stride);
     for (block, group) in blocks.iter_mut().zip(groups) {
