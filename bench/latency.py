@@ -67,8 +67,6 @@ def main():
     network = images / "network.json"
     network.write_bytes(described.stdout)
     description = json.loads(described.stdout)
-    problem = images / "problem.json"
-    problem.write_text(json.dumps(description["problem"]))
     for mish in onnx_chain.MISH:
         onnx.save(onnx_chain.whole(description, mish), images / f"chain-{mish}.onnx")
     onnx.save(onnx_chain.step(description, "rational"), images / "step-rational.onnx")
@@ -81,7 +79,7 @@ def main():
     peers = [Side(f"onnxruntime, one graph, {mish}", [*python, "onnxruntime", images / f"chain-{mish}.onnx", network])
              for mish in onnx_chain.MISH]
     peers += [Side("onnxruntime, a call a step", [*python, "onnxruntime-steps", images, network])]
-    peers += [Side(f"tract, one graph, {mish}", [programs / "tract", images / f"chain-{mish}.onnx", problem])
+    peers += [Side(f"tract, one graph, {mish}", [*python, "tract", images / f"chain-{mish}.onnx", network])
               for mish in onnx_chain.MISH]
     peers += [Side("candle", [programs / "candle", network])]
     peers += [Side(f"PyTorch, {form}", [*python, f"torch-{form}", network]) for form in ("eager", "jit", "compile")]

@@ -5,16 +5,16 @@
 #
 #   bench/latency.sh [--rounds 30] [--actions 30]
 #
-# ARMOR_PEERS_PYTHON names a Python that has torch, onnx and onnxruntime; without
+# ARMOR_PEERS_PYTHON names a Python that has torch, onnx, onnxruntime and tract; without
 # it, one is made in target/bench-peers. Meant for a machine that does nothing
 # else meanwhile; the load is printed with the table.
 set -eu
 cd "$(dirname "$0")/.."
 target="${CARGO_TARGET_DIR:-$PWD/target}"
 python="${ARMOR_PEERS_PYTHON:-$target/bench-peers/bin/python}"
-if [ -z "${ARMOR_PEERS_PYTHON:-}" ] && ! "$python" -c 'import onnxruntime, torch' 2>/dev/null; then
+if [ -z "${ARMOR_PEERS_PYTHON:-}" ] && ! "$python" -c 'import onnxruntime, torch, tract' 2>/dev/null; then
     python3 -m venv "$target/bench-peers"
-    "$python" -m pip install --quiet numpy onnx==1.23.2 onnxruntime==1.32.0 torch==2.15.0
+    "$python" -m pip install --quiet numpy onnx==1.23.2 onnxruntime==1.32.0 torch==2.15.0 tract==0.23.9
 fi
 if [ ! -f "$target/bench-latency/int8.armor" ]; then
     cargo run --release --quiet -p armor-train --example sized_policies -- "$target/bench-latency"

@@ -1,7 +1,7 @@
-"""The sides of latency.py that run in Python: onnxruntime and PyTorch.
+"""The sides of latency.py that run in Python: onnxruntime, tract and PyTorch.
 
 usage: latency_python.py onnxruntime MODEL NETWORK | onnxruntime-steps FOLDER NETWORK
-                         | torch-eager NETWORK | torch-jit NETWORK | torch-compile NETWORK
+                         | tract MODEL NETWORK | torch-eager NETWORK | torch-jit NETWORK | torch-compile NETWORK
 """
 
 import json
@@ -69,6 +69,14 @@ def onnxruntime_steps(folder, description):
     return act
 
 
+def tract_whole(model, description):
+    import tract
+
+    run = tract.onnx().load(str(model)).into_model().into_runnable()
+    given = [tract.Tensor.from_numpy(value) for value in inputs(description).values()]
+    return lambda: run.run(given)[0].to_numpy()
+
+
 def torch_side(form, description):
     import torch
     from torch import nn
@@ -134,6 +142,8 @@ def main():
         serve(onnxruntime_whole(arguments[0], description))
     elif side == "onnxruntime-steps":
         serve(onnxruntime_steps(arguments[0], description))
+    elif side == "tract":
+        serve(tract_whole(arguments[0], description))
     else:
         serve(torch_side(side.removeprefix("torch-"), description))
 

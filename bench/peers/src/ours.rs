@@ -8,23 +8,25 @@
 
 use std::error::Error;
 use std::hint::black_box;
-use std::path::Path;
 
-use armor_core::image::{Network, PolicyImage};
+use armor_core::image::{Network, PolicyImage, SECTION_ALIGNMENT};
 use armor_core::noise::Noise;
 use armor_core::schedule::ChainStep;
 use armor_core::units::CostLimit;
 use armor_infer::{Controller, Policy};
-use firmware_sim::memory::AlignedBytes;
 use serde_json::{Value, json};
 
 const LIMIT: f32 = 3.0;
 const SEED: u64 = 1;
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let [request, path]: [String; 2] = std::env::args().skip(1).collect::<Vec<_>>().try_into().map_err(|_| "network|fly|read IMAGE")?;
-    let memory = AlignedBytes::read(Path::new(&path))?;
-    let image = PolicyImage::new_checked(memory.as_slice())?;
+    let arguments: Result<[String; 2], _> = std::env::args().skip(1).collect::<Vec<_>>().try_into();
+    let [request, path] = arguments.map_err(|_| "usage: ours network|fly|read IMAGE")?;
+    let bytes = std::fs::read(&path)?;
+    let mut memory = vec![0; bytes.len() + SECTION_ALIGNMENT];
+    let start = memory.as_ptr().align_offset(SECTION_ALIGNMENT);
+    memory[start..][..bytes.len()].copy_from_slice(&bytes);
+    let image = PolicyImage::new_checked(&memory[start..])?;
     match request.as_str() {
         "network" => println!("{}", network(&image).ok_or("the network is not in single precision")?),
         "fly" => {
