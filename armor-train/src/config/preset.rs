@@ -31,7 +31,7 @@ pub enum Preset {
     /// What flies is an average of the actor, and rates fall: without them one
     /// seed in three was unsafe on ball-run.
     Quick,
-    /// What measured better than `quick` (`docs/options.md`).
+    /// Still `quick`: of the changes tried, none measured better (`docs/options.md`).
     Tuned,
 }
 
