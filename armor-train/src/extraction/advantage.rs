@@ -74,18 +74,18 @@ impl Advantages {
 }
 
 impl<T: Scalar> Judges<'_, T> {
-    /// The temporal differences of reward and long-term cost of a batch `[B]`.
-    ///
-    /// An episode that ended by its time limit would have gone on: its last state has a value.
+    /// The temporal differences of reward and long-term cost of a batch `[B]`: what is behind an
+    /// episode's end counts as it does for the critics.
     fn differ(&self, batch: &Batch<T>, traces: [Trace; 2], out: &mut [[f64; 2]]) {
         let (value, parameters) = self.value;
         let [mut here, mut next] = [(); 2].map(|()| value.tape(batch.samples()));
         value.forward(parameters, &TASKS, (&batch.state, &batch.kappa), &mut here, false);
         value.forward(parameters, &TASKS, (&batch.next_state, &batch.next_kappa), &mut next, false);
         for (place, (task, signal)) in TASKS.into_iter().zip([&batch.reward, &batch.cost]).enumerate() {
-            let values = here.values(task).zip(next.values(task)).zip(signal);
-            for (out, ((here, next), signal)) in out.iter_mut().zip(values) {
-                out[place] = signal.to_f64() + traces[place].discount * next.to_f64() - here.to_f64();
+            let values = here.values(task).zip(next.values(task)).zip(signal.iter().zip(&batch.alive));
+            for (out, ((here, next), (signal, alive))) in out.iter_mut().zip(values) {
+                let ahead = traces[place].discount * alive.to_f64() * next.to_f64();
+                out[place] = signal.to_f64() + ahead - here.to_f64();
             }
         }
     }
@@ -144,7 +144,7 @@ mod tests {
         }
     }
 
-    /// The recorded return of the rest of a trajectory and the value behind it, above the state's own value.
+    /// Nothing counts behind an episode's end, as in the critics' targets.
     #[test]
     fn along_a_whole_trace_an_advantage_is_the_recorded_return_above_the_value() {
         let data = recording(2, 70, |row| (row % 7) as f32, |row| f32::from(row % 3 == 0));
@@ -158,12 +158,11 @@ mod tests {
         let found = Advantages::new(&source, judges, config.traces());
         for row in [0, 3, 69, 70, SHARE, 139] {
             for (place, discount) in [0.9f64, 0.95].into_iter().enumerate() {
-                let value_at = |row: usize, next: bool| {
+                let own = {
                     let mut batch = source.room(1);
                     source.fill(&mut batch, 0, row, 0.0);
                     let mut tape = value.tape(1);
-                    let state = if next { &batch.next_state } else { &batch.state };
-                    value.forward(&values, &TASKS, (state, &batch.kappa), &mut tape, false);
+                    value.forward(&values, &TASKS, (&batch.state, &batch.kappa), &mut tape, false);
                     tape.values(TASKS[place]).next().unwrap()
                 };
                 let end = data.trajectories()[data.trajectory(row)].rows.end;
@@ -171,9 +170,8 @@ mod tests {
                     0 => config.reward_scale * f64::from(data.reward(row)),
                     _ => f64::from(data.cost(row)),
                 };
-                let sum: f64 = (row..end).map(|row_| discount.powi((row_ - row) as i32) * signal(row_)).sum();
-                let behind = discount.powi((end - row) as i32) * value_at(end - 1, true);
-                let expected = sum + behind - value_at(row, false);
+                let sum: f64 = (row..end).map(|later| discount.powi((later - row) as i32) * signal(later)).sum();
+                let expected = sum - own;
                 let advantage = f64::from(found.scaled[row][place]) * found.scales[place];
                 assert!((advantage - expected).abs() < 1e-6, "row {row}: {advantage} is not {expected}");
             }
