@@ -19,10 +19,12 @@ use crate::run::{Checkpoint, METRICS_FILE, Outcome, Table};
 use crate::study::{ABLATION, Flown, Row, Run, Score, Study as Definition, markdown};
 
 /// The studies that ship with the project.
-const SHIPPED: [(&str, &str); 3] = [
+const SHIPPED: [(&str, &str); 5] = [
     ("ablation", ABLATION),
     ("options-ball-run", include_str!("../../studies/options-ball-run.toml")),
     ("options-point-circle", include_str!("../../studies/options-point-circle.toml")),
+    ("real-ball-run", include_str!("../../studies/real-ball-run.toml")),
+    ("real-point-circle", include_str!("../../studies/real-point-circle.toml")),
 ];
 /// The table within the study's folder.
 const TABLE_FILE: &str = "table.md";
@@ -35,7 +37,7 @@ const TABLE_FILE: &str = "table.md";
 #[derive(Debug, clap::Args)]
 pub(super) struct Study {
     /// A TOML file, or a study that ships with the project: ablation,
-    /// options-ball-run, options-point-circle.
+    /// options-ball-run, options-point-circle, real-ball-run, real-point-circle.
     name: String,
     /// An HDF5 file in the DSRL layout.
     #[arg(long, value_name = "H5")]

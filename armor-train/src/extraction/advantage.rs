@@ -74,18 +74,18 @@ impl Advantages {
 }
 
 impl<T: Scalar> Judges<'_, T> {
-    /// The temporal differences of reward and long-term cost of a batch `[B]`.
-    ///
-    /// An episode that ended by its time limit would have gone on: its last state has a value.
+    /// The temporal differences of reward and long-term cost of a batch `[B]`: what is behind an
+    /// episode's end counts as it does for the critics.
     fn differ(&self, batch: &Batch<T>, traces: [Trace; 2], out: &mut [[f64; 2]]) {
         let (value, parameters) = self.value;
         let [mut here, mut next] = [(); 2].map(|()| value.tape(batch.samples()));
         value.forward(parameters, &TASKS, (&batch.state, &batch.kappa), &mut here, false);
         value.forward(parameters, &TASKS, (&batch.next_state, &batch.next_kappa), &mut next, false);
         for (place, (task, signal)) in TASKS.into_iter().zip([&batch.reward, &batch.cost]).enumerate() {
-            let values = here.values(task).zip(next.values(task)).zip(signal);
-            for (out, ((here, next), signal)) in out.iter_mut().zip(values) {
-                out[place] = signal.to_f64() + traces[place].discount * next.to_f64() - here.to_f64();
+            let values = here.values(task).zip(next.values(task)).zip(signal.iter().zip(&batch.alive));
+            for (out, ((here, next), (signal, alive))) in out.iter_mut().zip(values) {
+                let ahead = traces[place].discount * alive.to_f64() * next.to_f64();
+                out[place] = signal.to_f64() + ahead - here.to_f64();
             }
         }
     }
@@ -109,6 +109,7 @@ impl<T: Scalar> Judges<'_, T> {
 mod tests {
     use super::*;
     use crate::config::Preset;
+    use crate::data::Mask;
     use crate::extraction::Advantage;
     use crate::normaliser::Normaliser;
     use crate::testing::{fill, recording};
@@ -144,38 +145,43 @@ mod tests {
         }
     }
 
-    /// The recorded return of the rest of a trajectory and the value behind it, above the state's own value.
+    /// What is behind the end of an episode counts where it does in the critics' targets: here all
+    /// episodes end by their time.
     #[test]
     fn along_a_whole_trace_an_advantage_is_the_recorded_return_above_the_value() {
-        let data = recording(2, 70, |row| (row % 7) as f32, |row| f32::from(row % 3 == 0));
-        let mut config = Preset::Quick.config("own", 1.0);
-        (config.advantage, config.reward_discount, config.long_cost_discount) = (Advantage::Recorded, 0.9, 0.95);
-        let normaliser = Normaliser::new(&data, true);
-        let source = Source::new(&config, &data, &normaliser);
-        let (critic, value) = (Critic::new(2, 1, 4, 4, 0.0), StateValue::new(2, 4, 0.0, [0.5; 3]));
-        let (target, values) = (fill(critic.size(), 1), fill(value.size(), 2));
-        let judges = Judges { critic: (&critic, &target), value: (&value, &values) };
-        let found = Advantages::new(&source, judges, config.traces());
-        for row in [0, 3, 69, 70, SHARE, 139] {
-            for (place, discount) in [0.9f64, 0.95].into_iter().enumerate() {
-                let value_at = |row: usize, next: bool| {
-                    let mut batch = source.room(1);
-                    source.fill(&mut batch, 0, row, 0.0);
-                    let mut tape = value.tape(1);
-                    let state = if next { &batch.next_state } else { &batch.state };
-                    value.forward(&values, &TASKS, (state, &batch.kappa), &mut tape, false);
-                    tape.values(TASKS[place]).next().unwrap()
-                };
+        for (mask, alive) in [(Mask::Any, 0.0), (Mask::Terminal, 1.0)] {
+            let data = recording(2, 70, |row| (row % 7) as f32, |row| f32::from(row % 3 == 0));
+            let mut config = Preset::Quick.config("own", 1.0);
+            (config.advantage, config.done_mask) = (Advantage::Recorded, mask);
+            (config.reward_discount, config.long_cost_discount) = (0.9, 0.95);
+            let normaliser = Normaliser::new(&data, true);
+            let source = Source::new(&config, &data, &normaliser);
+            let (critic, value) = (Critic::new(2, 1, 4, 4, 0.0), StateValue::new(2, 4, 0.0, [0.5; 3]));
+            let (target, values) = (fill(critic.size(), 1), fill(value.size(), 2));
+            let judges = Judges { critic: (&critic, &target), value: (&value, &values) };
+            let found = Advantages::new(&source, judges, config.traces());
+            let values_at = |row: usize, next: bool| {
+                let mut batch = source.room(1);
+                source.fill(&mut batch, 0, row, 0.0);
+                let mut tape = value.tape(1);
+                let state = if next { &batch.next_state } else { &batch.state };
+                value.forward(&values, &TASKS, (state, &batch.kappa), &mut tape, false);
+                TASKS.map(|task| tape.values(task).next().unwrap())
+            };
+            for row in [0, 3, 69, 70, SHARE, 139] {
                 let end = data.trajectories()[data.trajectory(row)].rows.end;
-                let signal = |row: usize| match place {
-                    0 => config.reward_scale * f64::from(data.reward(row)),
-                    _ => f64::from(data.cost(row)),
-                };
-                let sum: f64 = (row..end).map(|row_| discount.powi((row_ - row) as i32) * signal(row_)).sum();
-                let behind = discount.powi((end - row) as i32) * value_at(end - 1, true);
-                let expected = sum + behind - value_at(row, false);
-                let advantage = f64::from(found.scaled[row][place]) * found.scales[place];
-                assert!((advantage - expected).abs() < 1e-6, "row {row}: {advantage} is not {expected}");
+                let (own, behind) = (values_at(row, false), values_at(end - 1, true));
+                for (place, discount) in [0.9f64, 0.95].into_iter().enumerate() {
+                    let signal = |row: usize| match place {
+                        0 => config.reward_scale * f64::from(data.reward(row)),
+                        _ => f64::from(data.cost(row)),
+                    };
+                    let power = |later: usize| discount.powi((later - row) as i32);
+                    let sum: f64 = (row..end).map(|later| power(later) * signal(later)).sum();
+                    let expected = sum + alive * power(end) * behind[place] - own[place];
+                    let advantage = f64::from(found.scaled[row][place]) * found.scales[place];
+                    assert!((advantage - expected).abs() < 1e-6, "row {row}: {advantage} is not {expected}");
+                }
             }
         }
     }

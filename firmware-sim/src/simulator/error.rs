@@ -55,7 +55,7 @@ pub enum SimulatorError {
         source: io::Error,
     },
     /// The simulator ended with an error.
-    #[error("the simulator of {task} failed: {said}")]
+    #[error("the simulator of {task} failed: {said}{remedy}", remedy = remedy(.said))]
     Failed {
         /// The task.
         task: &'static str,
@@ -77,5 +77,29 @@ impl SimulatorError {
     pub(super) fn system(action: &'static str, path: impl Into<PathBuf>) -> impl FnOnce(io::Error) -> Self {
         let path = path.into();
         move |source| Self::System { action, path, source }
+    }
+}
+
+/// What to do about a package that the environment lacks, unless that is said already.
+fn remedy(said: &str) -> &'static str {
+    if said.contains("No module named") && !said.contains("install") {
+        "; install the simulators in that environment: pip install --no-deps -r firmware-sim/python/simulators.txt"
+    } else {
+        ""
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_missing_package_is_answered_with_the_command_that_installs_it_once() {
+        let message = |said: &str| SimulatorError::Failed { task: "SafetyBallRun-v0", said: said.into() }.to_string();
+        let command = "pip install --no-deps -r firmware-sim/python/simulators.txt";
+        assert!(message("ModuleNotFoundError: No module named 'numpy'").ends_with(command));
+        let told = format!("No module named 'mujoco'; install the simulators: {command}");
+        assert_eq!(message(&told), format!("the simulator of SafetyBallRun-v0 failed: {told}"));
+        assert_eq!(message("stopped"), "the simulator of SafetyBallRun-v0 failed: stopped");
     }
 }

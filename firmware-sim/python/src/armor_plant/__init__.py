@@ -13,6 +13,7 @@ module                says
 ``tasks``             the 14 tasks, and what scores are normalised by
 ``repairs``, ``plants``  the simulators, mended; one interface for both
 ``flight``, ``report``  episodes and their scores
+``wander``            random actions in place of a controller
 ``recording``         DSRL files of what was flown
 ``cli``               the command ``armor-plant``
 ====================  ========================================================

@@ -60,6 +60,8 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _run(arguments: argparse.Namespace) -> None:
+    if arguments.record and not arguments.record.absolute().parent.is_dir():
+        raise ValueError(f"{arguments.record} lies in no folder; make the folder first")
     plant = make(arguments.task)
     task = plant.task
     steps = task.horizon if arguments.steps is None else min(arguments.steps, task.horizon)

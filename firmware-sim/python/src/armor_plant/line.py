@@ -31,7 +31,13 @@ class Socket:
         host, _, port = address.rpartition(":")
         if not port.isdecimal():
             raise ValueError(f"{address} is no address; write it as HOST:PORT")
-        self._socket = socket.create_connection((host.strip("[]"), int(port)), timeout=patience)
+        try:
+            self._socket = socket.create_connection((host.strip("[]"), int(port)), timeout=patience)
+        except OSError as error:
+            reason = error.strerror or error
+            raise OSError(
+                f"cannot connect to {address}: {reason}; start firmware-sim serve --listen there"
+            ) from error
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
 
     def write(self, data: bytes) -> None:
