@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::product::{Operand, Packed, Update};
+use super::product::{Operand, Packed, Update, product};
 use super::{Activation, Linear, Scalar};
 
 /// Layout of a stack of layers within a parameter vector.
@@ -100,7 +100,9 @@ impl Mlp {
 
     /// Runs the stack on `input`, `inputs x samples`; with `slopes`, a backward pass may follow.
     pub fn forward<T: Scalar>(&self, parameters: &[T], input: &DMatrix<T>, tape: &mut Tape<T>, slopes: bool) {
-        self.forward_packed((parameters, &self.pack(parameters)), input, tape, slopes);
+        self.run(parameters, input, tape, slopes, |layer, out, input| {
+            product(out, self.layers[layer].weights(parameters), input, Update::Replace);
+        });
     }
 
     /// As [`Mlp::forward`], with the parameters' [`Mlp::pack`].
@@ -111,12 +113,26 @@ impl Mlp {
         tape: &mut Tape<T>,
         slopes: bool,
     ) {
+        self.run(parameters, input, tape, slopes, |layer, out, input| {
+            weights[layer].multiply(out, input, Update::Replace);
+        });
+    }
+
+    /// A forward pass; `multiply` writes the product of a layer's weights and its input.
+    fn run<T: Scalar>(
+        &self,
+        parameters: &[T],
+        input: &DMatrix<T>,
+        tape: &mut Tape<T>,
+        slopes: bool,
+        multiply: impl Fn(usize, &mut [T], Operand<'_, T>),
+    ) {
         tape.columns = input.ncols();
-        for (index, (layer, weights)) in self.layers.iter().zip(weights).enumerate() {
+        for (index, layer) in self.layers.iter().enumerate() {
             let (before, rest) = tape.values.split_at_mut(index);
             let input = before.last().unwrap_or(input);
             let values = &mut rest[0];
-            weights.multiply(values.as_mut_slice(), input.into(), Update::Replace);
+            multiply(index, values.as_mut_slice(), input.into());
             let bias = layer.bias(parameters);
             match self.activation(index) {
                 Some(activation) => activation.apply(values, slopes.then_some(&mut tape.slopes[index]), bias),
@@ -138,36 +154,56 @@ impl Mlp {
         gradient: Option<&mut [T]>,
         input_gradient: Option<&mut DMatrix<T>>,
     ) {
-        self.backward_packed(&self.pack_transposed(parameters), input, tape, gradient, input_gradient);
+        let below = input_gradient.map(|gradient| (gradient.as_mut_slice(), Update::Replace));
+        self.run_back(input, tape, gradient, below, |layer, out, delta, update| {
+            product(out, self.layers[layer].weights(parameters).transposed(), delta, update);
+        });
     }
 
-    /// As [`Mlp::backward`], with the parameters' [`Mlp::pack_transposed`].
+    /// As [`Mlp::backward`], with the parameters' [`Mlp::pack_transposed`]; the gradient
+    /// with respect to the input is multiplied by `slopes`, entry by entry.
     pub fn backward_packed<T: Scalar>(
         &self,
         transposes: &[Packed<T>],
         input: &DMatrix<T>,
         tape: &mut Tape<T>,
+        gradient: &mut [T],
+        (input_gradient, slopes): (&mut DMatrix<T>, &DMatrix<T>),
+    ) {
+        let below = (input_gradient.as_mut_slice(), Update::Times(slopes.as_slice()));
+        self.run_back(input, tape, Some(gradient), Some(below), |layer, out, delta, update| {
+            transposes[layer].multiply(out, delta, update);
+        });
+    }
+
+    /// A backward pass; `multiply` writes the product of a layer's transposed weights and its delta.
+    fn run_back<T: Scalar>(
+        &self,
+        input: &DMatrix<T>,
+        tape: &mut Tape<T>,
         mut gradient: Option<&mut [T]>,
-        input_gradient: Option<&mut DMatrix<T>>,
+        mut input_gradient: Option<(&mut [T], Update<'_, T>)>,
+        multiply: impl Fn(usize, &mut [T], Operand<'_, T>, Update<'_, T>),
     ) {
         let columns = tape.columns;
-        for (index, (layer, weights)) in self.layers.iter().zip(transposes).enumerate().rev() {
-            if self.activation(index).is_some() {
-                scale(&mut tape.deltas[index], &tape.slopes[index], columns);
-            }
+        if let (Some(_), Some(delta), Some(slopes)) = (self.output, tape.deltas.last_mut(), tape.slopes.last()) {
+            scale(delta, slopes, columns);
+        }
+        for (index, layer) in self.layers.iter().enumerate().rev() {
             let (before, rest) = tape.deltas.split_at_mut(index);
             let delta = Operand::leading(&rest[0], columns);
             if let Some(gradient) = gradient.as_deref_mut() {
                 let input = if index == 0 { input } else { &tape.values[index - 1] };
                 layer.add_gradient(gradient, delta, Operand::leading(input, columns));
             }
-            if let Some(below) = before.last_mut() {
-                weights.multiply(&mut below.as_mut_slice()[..layer.inputs * columns], delta, Update::Replace);
+            let below = match before.last_mut() {
+                Some(below) => Some((below.as_mut_slice(), Update::Times(tape.slopes[index - 1].as_slice()))),
+                None => input_gradient.take(),
+            };
+            if let Some((out, update)) = below {
+                let len = layer.inputs * columns;
+                multiply(index, &mut out[..len], delta, update.within(..len));
             }
-        }
-        if let (Some(input_gradient), [first, ..], [weights, ..]) = (input_gradient, &self.layers[..], transposes) {
-            let input_gradient = &mut input_gradient.as_mut_slice()[..first.inputs * columns];
-            weights.multiply(input_gradient, Operand::leading(&tape.deltas[0], columns), Update::Replace);
         }
     }
 
@@ -198,7 +234,7 @@ pub fn keep_columns<T: Scalar>(matrix: &mut DMatrix<T>, columns: &[usize]) {
 }
 
 /// Multiplies the first `columns` columns by `slopes`, entry by entry.
-pub fn scale<T: Scalar>(delta: &mut DMatrix<T>, slopes: &DMatrix<T>, columns: usize) {
+fn scale<T: Scalar>(delta: &mut DMatrix<T>, slopes: &DMatrix<T>, columns: usize) {
     let len = delta.nrows() * columns;
     for (delta, &slope) in delta.as_mut_slice()[..len].iter_mut().zip(slopes.as_slice()) {
         *delta *= slope;

@@ -19,7 +19,7 @@ mod sinusoid;
 pub use activation::Activation;
 pub use adam::Adam;
 pub use linear::Linear;
-pub use mlp::{Mlp, Tape, keep_columns, scale};
+pub use mlp::{Mlp, Tape, keep_columns};
 pub use product::{Operand, Packed, Update, product};
 pub use scalar::Scalar;
 pub use sinusoid::{Frequencies, TimeFrequencies, sinusoidal_code};
