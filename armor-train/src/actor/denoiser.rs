@@ -268,8 +268,8 @@ impl Denoiser {
         product(table, self.first.block(parameters, of_time), context.time.output().into(), Update::Replace);
         context.constant_gradient.fill(T::zero());
         context.table_gradient.fill(T::zero());
-        context.body = self.body.pack(parameters);
-        context.body_transposed = self.body.pack_transposed(parameters);
+        self.body.pack(parameters, &mut context.body);
+        self.body.pack_transposed(parameters, &mut context.body_transposed);
     }
 
     /// Predicts the noise in `call.action` at `call.levels`; with `slopes`, a backward pass may follow.

@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 
 use super::product::{Operand, Packed, Update, product};
-use super::{Activation, Linear, Scalar};
+use super::{Activation, Linear, Scalar, Tape};
 
 /// Layout of a stack of layers within a parameter vector.
 #[derive(Clone, Debug)]
@@ -12,47 +12,6 @@ pub struct Mlp {
     activation: Activation,
     /// What follows the last layer; nothing where its sums are the output.
     output: Option<Activation>,
-}
-
-/// What a forward pass leaves behind for the backward pass; reused from step to step.
-#[derive(Clone, Debug)]
-pub struct Tape<T: Scalar> {
-    /// Output of each layer.
-    values: Vec<DMatrix<T>>,
-    /// Derivative of each layer's activation.
-    slopes: Vec<DMatrix<T>>,
-    /// Gradient with respect to each layer's sum.
-    deltas: Vec<DMatrix<T>>,
-    /// Columns of the above that hold samples.
-    columns: usize,
-}
-
-impl<T: Scalar> Tape<T> {
-    /// The output of the last forward pass, `outputs x samples`.
-    pub fn output(&self) -> &DMatrix<T> {
-        self.values.last().expect("an Mlp has a layer")
-    }
-
-    /// Where the gradient with respect to the output is written before a backward pass.
-    pub fn output_gradient(&mut self) -> &mut DMatrix<T> {
-        self.deltas.last_mut().expect("an Mlp has a layer")
-    }
-
-    /// Frees the room of the gradients; [`Tape::swap_gradients`] gives it another.
-    pub fn free_gradients(&mut self) {
-        self.deltas.clear();
-    }
-
-    /// Exchanges the room of the gradients, which need not outlive a backward pass.
-    pub fn swap_gradients(&mut self, other: &mut Self) {
-        std::mem::swap(&mut self.deltas, &mut other.deltas);
-    }
-
-    /// Keeps these samples (ascending) for the backward pass, in the leading columns, and forgets the others.
-    pub fn keep(&mut self, samples: &[usize]) {
-        self.values.iter_mut().chain(&mut self.slopes).for_each(|matrix| keep_columns(matrix, samples));
-        self.columns = samples.len();
-    }
 }
 
 impl Mlp {
@@ -88,14 +47,14 @@ impl Mlp {
         if layer + 1 < self.layers.len() { Some(self.activation) } else { self.output }
     }
 
-    /// The weights, for many forward passes with the same parameters.
-    pub fn pack<T: Scalar>(&self, parameters: &[T]) -> Vec<Packed<T>> {
-        self.layers.iter().map(|layer| Packed::new(layer.weights(parameters))).collect()
+    /// The weights, for many forward passes with the same parameters; `packed` is what is replaced.
+    pub fn pack<T: Scalar>(&self, parameters: &[T], packed: &mut Vec<Packed<T>>) {
+        pack(self.layers.iter().map(|layer| layer.weights(parameters)), packed);
     }
 
-    /// The transposed weights, for many backward passes with the same parameters.
-    pub fn pack_transposed<T: Scalar>(&self, parameters: &[T]) -> Vec<Packed<T>> {
-        self.layers.iter().map(|layer| Packed::new(layer.weights(parameters).transposed())).collect()
+    /// As [`Mlp::pack`], of the transposed weights, for backward passes.
+    pub fn pack_transposed<T: Scalar>(&self, parameters: &[T], packed: &mut Vec<Packed<T>>) {
+        pack(self.layers.iter().map(|layer| layer.weights(parameters).transposed()), packed);
     }
 
     /// Runs the stack on `input`, `inputs x samples`; with `slopes`, a backward pass may follow.
@@ -225,11 +184,13 @@ impl Linear {
     }
 }
 
-/// Moves the given columns (ascending) to the front.
-pub fn keep_columns<T: Scalar>(matrix: &mut DMatrix<T>, columns: &[usize]) {
-    let rows = matrix.nrows();
-    for (to, &from) in columns.iter().enumerate().filter(|&(to, &from)| to != from) {
-        matrix.as_mut_slice().copy_within(from * rows..(from + 1) * rows, to * rows);
+/// Copies the matrices, into the memory of the copies before them where there are some.
+fn pack<'a, T: Scalar>(matrices: impl Iterator<Item = Operand<'a, T>>, packed: &mut Vec<Packed<T>>) {
+    for (index, matrix) in matrices.enumerate() {
+        match packed.get_mut(index) {
+            Some(packed) => packed.set(matrix),
+            None => packed.push(Packed::new(matrix)),
+        }
     }
 }
 
@@ -250,57 +211,4 @@ fn add_bias<T: Scalar>(values: &mut DMatrix<T>, bias: &[T]) {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::testing::{assert_gradient, fill};
-
-    fn check(activation: Activation, output: Option<Activation>) {
-        let mlp = Mlp::new(&[3, 8, 7, 2], 0, activation, output);
-        let parameters: Vec<f64> = fill(mlp.end(), 1);
-        let input = DMatrix::from_vec(3, 6, fill(18, 2));
-        let seed = DMatrix::from_vec(2, 6, fill(12, 3));
-        let mut tape = mlp.tape(6);
-
-        let loss = |parameters: &[f64], input: &DMatrix<f64>| {
-            let mut tape = mlp.tape(6);
-            mlp.forward(parameters, input, &mut tape, false);
-            tape.output().dot(&seed)
-        };
-        let mut gradient = vec![0.0; mlp.end()];
-        let mut input_gradient = DMatrix::zeros(3, 6);
-        mlp.forward(&parameters, &input, &mut tape, true);
-        tape.output_gradient().copy_from(&seed);
-        mlp.backward(&parameters, &input, &mut tape, Some(&mut gradient), Some(&mut input_gradient));
-
-        assert_gradient(&parameters, &gradient, |parameters| loss(parameters, &input));
-        assert_gradient(input.as_slice(), input_gradient.as_slice(), |values| {
-            loss(&parameters, &DMatrix::from_column_slice(3, 6, values))
-        });
-    }
-
-    #[test]
-    fn gradients_are_those_of_finite_differences() {
-        check(Activation::Mish, None);
-        check(Activation::Mish, Some(Activation::Mish));
-        check(Activation::Mish, Some(Activation::Softplus));
-        check(Activation::Relu, None);
-    }
-
-    #[test]
-    fn a_second_backward_pass_adds_to_the_gradient() {
-        let mlp = Mlp::new(&[2, 3, 1], 0, Activation::Mish, None);
-        let parameters: Vec<f64> = fill(mlp.end(), 1);
-        let input = DMatrix::from_vec(2, 4, fill(8, 2));
-        let mut tape = mlp.tape(4);
-        let mut gradient = vec![0.0; mlp.end()];
-        mlp.forward(&parameters, &input, &mut tape, true);
-        tape.output_gradient().fill(1.0);
-        mlp.backward(&parameters, &input, &mut tape, Some(&mut gradient), None);
-        let once = gradient.clone();
-        tape.output_gradient().fill(1.0);
-        mlp.backward(&parameters, &input, &mut tape, Some(&mut gradient), None);
-        for (twice, once) in gradient.iter().zip(&once) {
-            assert!((twice - 2.0 * once).abs() < 1e-12);
-        }
-    }
-}
+mod tests;

@@ -117,12 +117,19 @@ pub struct Packed<T> {
 impl<T: Scalar> Packed<T> {
     /// A copy of `matrix`.
     pub fn new(matrix: Operand<'_, T>) -> Self {
-        let (rows, depth) = (matrix.rows(), matrix.columns());
-        let mut panels = Vec::with_capacity(rows.div_ceil(ROWS) * depth);
-        for first in (0..rows).step_by(ROWS) {
-            append_panel(&mut panels, matrix, first);
+        let mut packed = Self { rows: 0, depth: 0, panels: Vec::new() };
+        packed.set(matrix);
+        packed
+    }
+
+    /// Replaces the copy by one of `matrix`, in the same memory.
+    pub fn set(&mut self, matrix: Operand<'_, T>) {
+        (self.rows, self.depth) = (matrix.rows(), matrix.columns());
+        self.panels.clear();
+        self.panels.reserve(self.rows.div_ceil(ROWS) * self.depth);
+        for first in (0..self.rows).step_by(ROWS) {
+            append_panel(&mut self.panels, matrix, first);
         }
-        Self { rows, depth, panels }
     }
 
     #[cfg(test)]
@@ -180,12 +187,17 @@ fn check<T>(out: &[T], [rows, depth]: [usize; 2], b: Operand<'_, T>, update: Upd
 fn append_panel<T: Scalar>(panels: &mut Vec<[T; ROWS]>, matrix: Operand<'_, T>, first: usize) {
     let height = ROWS.min(matrix.rows() - first);
     if matrix.transposed {
-        let start = panels.len();
-        panels.resize(start + matrix.columns(), [T::zero(); ROWS]);
-        for row in 0..height {
-            for (panel, &value) in panels[start..].iter_mut().zip(matrix.stored_column(first + row)) {
-                panel[row] = value;
-            }
+        // Block by block: a row of a block lies in one line of the cache, and so does a row of a panel.
+        for start in (0..matrix.columns()).step_by(ROWS) {
+            let block: [[T; ROWS]; ROWS] = std::array::from_fn(|row| {
+                let values = if row < height { &matrix.stored_column(first + row)[start..] } else { &[] };
+                match values.first_chunk() {
+                    Some(&values) => values,
+                    None => std::array::from_fn(|place| values.get(place).copied().unwrap_or(T::zero())),
+                }
+            });
+            let depth = ROWS.min(matrix.columns() - start);
+            panels.extend((0..depth).map(|place| block.map(|row| row[place])));
         }
     } else {
         panels.extend(matrix.stored_columns().map(|column| match column[first..].first_chunk() {
