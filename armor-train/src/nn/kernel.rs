@@ -193,15 +193,14 @@ mod tests {
                     by_the_letter(&mut expected, &a, &b, update);
                     for (left, right) in lefts.into_iter().flat_map(|left| rights.map(|right| (left, right))) {
                         let packed = Packed::new(left);
-                        let ways: [&dyn Fn(&mut [f32]); 3] = [
-                            &|out| product(out, left, right, update),
-                            &|out| packed.multiply(out, right, update),
-                            &|out| multiply_safely(out, m, packed.panels(), right, update),
-                        ];
-                        for (way, multiply) in ways.into_iter().enumerate() {
+                        for way in ["product", "packed", "safe"] {
                             let mut out = before.clone();
-                            multiply(out.as_mut_slice());
-                            assert_eq!(bits(&out), bits(&expected), "way {way}, {m} x {k} x {n}, {update:?}");
+                            match way {
+                                "product" => product(out.as_mut_slice(), left, right, update),
+                                "packed" => packed.multiply(out.as_mut_slice(), right, update),
+                                _ => multiply_safely(out.as_mut_slice(), m, packed.panels(), right, update),
+                            }
+                            assert_eq!(bits(&out), bits(&expected), "{way}, {m} x {k} x {n}, {update:?}");
                         }
                     }
                 }

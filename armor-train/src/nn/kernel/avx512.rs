@@ -161,28 +161,26 @@ unsafe fn tiles<const P: usize, const C: usize>(
                     inout(reg) * p1,
                     inout(reg) * p2,
                     inout(reg) * p3,
-                    options(pure, nomem, nostack, preserves_flags),
+                    options(pure, readonly, nostack, preserves_flags),
                 );
             }
         }
-        for column in 0..C {
-            for panel in 0..P {
+        for (column, sums) in sums.iter().enumerate() {
+            for (panel, (&sum, &mask)) in sums.iter().zip(&masks).enumerate() {
                 let start = (at + column) * left.rows + first + panel * ROWS;
-                let (place, mask) = (out[start..].as_mut_ptr(), masks[panel]);
+                let place = out[start..].as_mut_ptr();
                 // SAFETY: the rows of the mask are rows of the column, which ends within `out`; other
                 // matrices are as long as `out`.
                 unsafe {
-                    let sum = match update {
-                        Update::Replace => sums[column][panel],
-                        Update::Add => _mm512_add_ps(_mm512_maskz_loadu_ps(mask, place), sums[column][panel]),
-                        Update::Plus(other) => {
-                            _mm512_add_ps(_mm512_maskz_loadu_ps(mask, other[start..].as_ptr()), sums[column][panel])
-                        }
+                    let value = match update {
+                        Update::Replace => sum,
+                        Update::Add => _mm512_add_ps(_mm512_maskz_loadu_ps(mask, place), sum),
+                        Update::Plus(other) => _mm512_add_ps(_mm512_maskz_loadu_ps(mask, other[start..].as_ptr()), sum),
                         Update::Times(other) => {
-                            _mm512_mul_ps(_mm512_maskz_loadu_ps(mask, other[start..].as_ptr()), sums[column][panel])
+                            _mm512_mul_ps(_mm512_maskz_loadu_ps(mask, other[start..].as_ptr()), sum)
                         }
                     };
-                    _mm512_mask_storeu_ps(place, mask, sum);
+                    _mm512_mask_storeu_ps(place, mask, value);
                 }
             }
         }
