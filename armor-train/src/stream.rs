@@ -62,11 +62,11 @@ pub(crate) fn fill_normal<T: Scalar>(noise: Noise, stream: u32, tick: u64, out: 
 }
 
 /// The numbers below `len` in a random order (Fisher and Yates).
-pub(crate) fn shuffled(len: usize, noise: Noise, tick: u64) -> Vec<usize> {
-    let mut order: Vec<usize> = (0..len).collect();
+pub(crate) fn shuffled(len: u32, noise: Noise, tick: u64) -> Vec<u32> {
+    let mut order: Vec<u32> = (0..len).collect();
     for last in (1..len).rev() {
-        let [word, ..] = noise.words(SHUFFLE, tick, last as u32);
-        order.swap(last, below(word, last as u32 + 1) as usize);
+        let [word, ..] = noise.words(SHUFFLE, tick, last);
+        order.swap(last as usize, below(word, last + 1) as usize);
     }
     order
 }

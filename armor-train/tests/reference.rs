@@ -295,7 +295,7 @@ fn counterfactual_weights_are_pytorchs() {
         }
     };
     let mut counterfactual = vec![1.0; SAMPLES];
-    let rows: Vec<usize> = (0..SAMPLES).collect();
+    let rows: Vec<u32> = (0..SAMPLES as u32).collect();
     settings.update(&to_f32(margin), &rows, &mut counterfactual);
     close("w_cf", &counterfactual);
     let mut weights =

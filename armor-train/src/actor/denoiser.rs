@@ -14,8 +14,7 @@ use std::ops::Range;
 use nalgebra::DMatrix;
 
 use crate::nn::{
-    Activation, Frequencies, Linear, Mlp, Operand, Packed, Scalar, Tape, Update, keep_columns, product, scale,
-    sinusoidal_code,
+    Activation, Frequencies, Linear, Mlp, Operand, Packed, Scalar, Tape, Update, keep_columns, product, sinusoidal_code,
 };
 
 /// Widths of the network.
@@ -269,19 +268,20 @@ impl Denoiser {
         product(table, self.first.block(parameters, of_time), context.time.output().into(), Update::Replace);
         context.constant_gradient.fill(T::zero());
         context.table_gradient.fill(T::zero());
-        context.body = self.body.pack(parameters);
-        context.body_transposed = self.body.pack_transposed(parameters);
+        self.body.pack(parameters, &mut context.body);
+        self.body.pack_transposed(parameters, &mut context.body_transposed);
     }
 
     /// Predicts the noise in `call.action` at `call.levels`; with `slopes`, a backward pass may follow.
     pub fn forward<T: Scalar>(&self, parameters: &[T], context: &Context<T>, call: &mut Call<T>, slopes: bool) {
         call.kept.clear();
         call.kept.extend(0..call.action.ncols());
-        call.hidden.copy_from(&context.constant);
         if self.sees_action {
             let [of_action, ..] = self.blocks();
-            let hidden = call.hidden.as_mut_slice();
-            product(hidden, self.first.block(parameters, of_action), (&call.action).into(), Update::Add);
+            let (hidden, constant) = (call.hidden.as_mut_slice(), context.constant.as_slice());
+            product(hidden, self.first.block(parameters, of_action), (&call.action).into(), Update::Plus(constant));
+        } else {
+            call.hidden.copy_from(&context.constant);
         }
         Activation::Mish.apply_by_level(
             &mut call.hidden,
@@ -301,11 +301,10 @@ impl Denoiser {
         call: &mut Call<T>,
         gradient: &mut [T],
     ) {
-        let Call { hidden, hidden_gradient, body, .. } = call;
-        let weights = &context.body_transposed;
-        self.body.backward_packed(weights, hidden, body, Some(gradient), Some(hidden_gradient));
+        let Call { hidden, hidden_slope, hidden_gradient, body, .. } = call;
+        let below = (&mut *hidden_gradient, &*hidden_slope);
+        self.body.backward_packed(&context.body_transposed, hidden, body, gradient, below);
         let columns = call.kept.len();
-        scale(hidden_gradient, &call.hidden_slope, columns);
 
         // A network that does not see the action leaves its gradient at zero.
         if self.sees_action {

@@ -1,19 +1,19 @@
 //! Quantiles.
 
 /// Values in ascending order; at least one.
-pub(crate) struct Sorted(Vec<f64>);
+pub(crate) struct Sorted<T>(Vec<T>);
 
-impl Sorted {
-    pub(crate) fn new(values: impl Iterator<Item = f64>) -> Self {
-        let mut values: Vec<f64> = values.collect();
-        values.sort_unstable_by(f64::total_cmp);
+impl<T: Copy + Into<f64>> Sorted<T> {
+    pub(crate) fn new(values: impl Iterator<Item = T>) -> Self {
+        let mut values: Vec<T> = values.collect();
+        values.sort_unstable_by(|&a, &b| f64::total_cmp(&a.into(), &b.into()));
         Self(values)
     }
 
     /// The value at `q * (n - 1)`, interpolated between its two neighbours.
     pub(crate) fn quantile(&self, q: f64) -> f64 {
         let at = q * (self.0.len() - 1) as f64;
-        let (below, above) = (self.0[at.floor() as usize], self.0[at.ceil() as usize]);
+        let [below, above] = [at.floor(), at.ceil()].map(|at| self.0[at as usize].into());
         below + (above - below) * at.fract()
     }
 }

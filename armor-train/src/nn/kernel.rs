@@ -10,11 +10,14 @@
 //! the place of an entry. CPUs without fused multiply-add round twice, so their
 //! bits differ.
 
+#[cfg(target_arch = "x86_64")]
+mod avx512;
+
 use multiversion::multiversion;
 use multiversion::target::target_cfg_f;
 
 use super::Scalar;
-use super::product::{Operand, Update};
+use super::product::{Operand, Packed, Update};
 
 /// Rows of a tile: two vectors of eight f32.
 pub(super) const ROWS: usize = 16;
@@ -39,15 +42,31 @@ fn tile<T: Scalar>(
     sums
 }
 
+/// Writes the product of a left factor of `rows` rows, in panels, and of `b` to `out`.
+#[inline(always)]
+pub(super) fn multiply<T: Scalar>(
+    out: &mut [T],
+    rows: usize,
+    panels: &[[T; ROWS]],
+    b: Operand<'_, T>,
+    update: Update<'_, T>,
+    multiply_add: impl Fn(T, T, T) -> T + Copy,
+) {
+    for panel in 0..rows.div_ceil(ROWS) {
+        let (first, place) = (panel * ROWS, panel * b.rows());
+        multiply_panel(out, (first, rows), &panels[place..place + b.rows()], b, update, multiply_add);
+    }
+}
+
 /// Writes the product of a panel of the left factor and all of `b` to `out`'s
 /// rows from `first` on; `out` has `rows` rows.
 #[inline(always)]
-pub(super) fn multiply_panel<T: Scalar>(
+fn multiply_panel<T: Scalar>(
     out: &mut [T],
     (first, rows): (usize, usize),
     panel: &[[T; ROWS]],
     b: Operand<'_, T>,
-    update: Update,
+    update: Update<'_, T>,
     multiply_add: impl Fn(T, T, T) -> T + Copy,
 ) {
     for (group, out) in out.chunks_mut(rows * COLUMNS).enumerate() {
@@ -66,37 +85,126 @@ pub(super) fn multiply_panel<T: Scalar>(
                 b.stored_columns().map(|row| std::array::from_fn(|column| row[(at + column).min(row.len() - 1)]));
             tile(panel, rows, multiply_add)
         };
-        for (out, sums) in out.chunks_exact_mut(rows).zip(&sums) {
-            // A whole panel's height is known when this is compiled.
-            match out[first..].first_chunk_mut::<ROWS>() {
-                Some(out) => store(out, sums, update),
-                None => store(&mut out[first..], sums, update),
-            }
+        for (column, (out, sums)) in (at..).zip(out.chunks_exact_mut(rows).zip(&sums)) {
+            store(&mut out[first..], sums, update.within(column * rows + first..));
         }
     }
 }
 
-/// Puts the sums of a column in their place.
+/// Puts the sums of a column in their place; `out` ends where the column does.
 #[inline(always)]
-fn store<T: Scalar>(out: &mut [T], sums: &[T; ROWS], update: Update) {
-    match update {
-        Update::Replace => out.iter_mut().zip(sums).for_each(|(out, &sum)| *out = sum),
-        Update::Add => out.iter_mut().zip(sums).for_each(|(out, &sum)| *out += sum),
+pub(super) fn store<T: Scalar>(out: &mut [T], sums: &[T; ROWS], update: Update<'_, T>) {
+    // A whole panel's height is known when this is compiled.
+    match out.first_chunk_mut::<ROWS>() {
+        Some(out) => store_rows(out, sums, update),
+        None => store_rows(out, sums, update),
     }
 }
 
-/// [`multiply_panel`] in f32, compiled for AVX2 as well and chosen at run time.
-#[multiversion(targets("x86_64+avx2+fma"))]
-pub(super) fn multiply_panel_f32(
+#[inline(always)]
+fn store_rows<T: Scalar>(out: &mut [T], sums: &[T; ROWS], update: Update<'_, T>) {
+    let out = out.iter_mut().zip(sums);
+    match update {
+        Update::Replace => out.for_each(|(out, &sum)| *out = sum),
+        Update::Add => out.for_each(|(out, &sum)| *out += sum),
+        Update::Plus(other) => out.zip(other).for_each(|((out, &sum), &other)| *out = other + sum),
+        Update::Times(other) => out.zip(other).for_each(|((out, &sum), &other)| *out = other * sum),
+    }
+}
+
+/// [`multiply`] in f32, by the widest vectors of this processor.
+pub(super) fn multiply_f32(
     out: &mut [f32],
-    place: (usize, usize),
-    panel: &[[f32; ROWS]],
+    rows: usize,
+    panels: &[[f32; ROWS]],
     b: Operand<'_, f32>,
-    update: Update,
+    update: Update<'_, f32>,
 ) {
+    #[cfg(target_arch = "x86_64")]
+    if let Some(kernel) = avx512::Avx512::detect() {
+        return kernel.multiply(out, rows, panels, b, update);
+    }
+    multiply_safely(out, rows, panels, b, update);
+}
+
+/// As [`multiply_f32`], with the left factor as it lies, if that saves a copy.
+pub(super) fn product_f32(out: &mut [f32], a: Operand<'_, f32>, b: Operand<'_, f32>, update: Update<'_, f32>) {
+    #[cfg(target_arch = "x86_64")]
+    if let Some(kernel) = avx512::Avx512::detect().filter(|_| !a.is_transposed()) {
+        return kernel.product(out, a, b, update);
+    }
+    Packed::new(a).multiply(out, b, update);
+}
+
+/// [`multiply`] in f32, compiled for AVX2 as well and chosen at run time.
+#[multiversion(targets("x86_64+avx2+fma"))]
+fn multiply_safely(out: &mut [f32], rows: usize, panels: &[[f32; ROWS]], b: Operand<'_, f32>, update: Update<'_, f32>) {
     if target_cfg_f!(any(target_feature = "fma", target_arch = "aarch64")) {
-        multiply_panel(out, place, panel, b, update, f32::mul_add);
+        multiply(out, rows, panels, b, update, f32::mul_add);
     } else {
-        multiply_panel(out, place, panel, b, update, |a, b, sum| a * b + sum);
+        multiply(out, rows, panels, b, update, |a, b, sum| a * b + sum);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::DMatrix;
+
+    use super::*;
+    use crate::nn::product::product;
+    use crate::testing::fill;
+
+    fn matrix(rows: usize, columns: usize, stream: u32) -> DMatrix<f32> {
+        let draws = fill(rows * columns, stream);
+        DMatrix::from_iterator(rows, columns, draws.into_iter().map(|draw| draw as f32))
+    }
+
+    /// The contract by the letter: in order, one multiply-add after the other, then the update.
+    fn by_the_letter(out: &mut DMatrix<f32>, a: &DMatrix<f32>, b: &DMatrix<f32>, update: Update<'_, f32>) {
+        for row in 0..a.nrows() {
+            for column in 0..b.ncols() {
+                let sum = (0..a.ncols()).fold(0.0, |sum, k| a[(row, k)].mul_add(b[(k, column)], sum));
+                out[(row, column)] = match update {
+                    Update::Replace => sum,
+                    Update::Add => out[(row, column)] + sum,
+                    Update::Plus(other) => other[column * a.nrows() + row] + sum,
+                    Update::Times(other) => other[column * a.nrows() + row] * sum,
+                };
+            }
+        }
+    }
+
+    fn bits(matrix: &DMatrix<f32>) -> Vec<u32> {
+        matrix.iter().map(|value| value.to_bits()).collect()
+    }
+
+    /// Every width of a tile's columns, whole and partial panels, one and two of them, an empty inner dimension.
+    #[test]
+    fn every_kernel_has_the_bits_of_a_plain_loop() {
+        for [m, n] in [[1, 1], [2, 5], [3, 31], [16, 12], [17, 23], [32, 27], [33, 13], [70, 6], [79, 12]] {
+            for k in [0, 1, 2, 19, 132] {
+                let (a, b, before, other) = (matrix(m, k, 1), matrix(k, n, 2), matrix(m, n, 3), matrix(m, n, 4));
+                let other = other.as_slice();
+                let (a_t, b_t) = (a.transpose(), b.transpose());
+                let lefts = [Operand::from(&a), Operand::from(&a_t).transposed()];
+                let rights = [Operand::from(&b), Operand::from(&b_t).transposed()];
+                for update in [Update::Replace, Update::Add, Update::Plus(other), Update::Times(other)] {
+                    let mut expected = before.clone();
+                    by_the_letter(&mut expected, &a, &b, update);
+                    for (left, right) in lefts.into_iter().flat_map(|left| rights.map(|right| (left, right))) {
+                        let packed = Packed::new(left);
+                        for way in ["product", "packed", "safe"] {
+                            let mut out = before.clone();
+                            match way {
+                                "product" => product(out.as_mut_slice(), left, right, update),
+                                "packed" => packed.multiply(out.as_mut_slice(), right, update),
+                                _ => multiply_safely(out.as_mut_slice(), m, packed.panels(), right, update),
+                            }
+                            assert_eq!(bits(&out), bits(&expected), "{way}, {m} x {k} x {n}, {update:?}");
+                        }
+                    }
+                }
+            }
+        }
     }
 }

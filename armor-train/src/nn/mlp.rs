@@ -2,8 +2,8 @@
 
 use nalgebra::DMatrix;
 
-use super::product::{Operand, Packed, Update};
-use super::{Activation, Linear, Scalar};
+use super::product::{Operand, Packed, Update, product};
+use super::{Activation, Linear, Scalar, Tape};
 
 /// Layout of a stack of layers within a parameter vector.
 #[derive(Clone, Debug)]
@@ -12,47 +12,6 @@ pub struct Mlp {
     activation: Activation,
     /// What follows the last layer; nothing where its sums are the output.
     output: Option<Activation>,
-}
-
-/// What a forward pass leaves behind for the backward pass; reused from step to step.
-#[derive(Clone, Debug)]
-pub struct Tape<T: Scalar> {
-    /// Output of each layer.
-    values: Vec<DMatrix<T>>,
-    /// Derivative of each layer's activation.
-    slopes: Vec<DMatrix<T>>,
-    /// Gradient with respect to each layer's sum.
-    deltas: Vec<DMatrix<T>>,
-    /// Columns of the above that hold samples.
-    columns: usize,
-}
-
-impl<T: Scalar> Tape<T> {
-    /// The output of the last forward pass, `outputs x samples`.
-    pub fn output(&self) -> &DMatrix<T> {
-        self.values.last().expect("an Mlp has a layer")
-    }
-
-    /// Where the gradient with respect to the output is written before a backward pass.
-    pub fn output_gradient(&mut self) -> &mut DMatrix<T> {
-        self.deltas.last_mut().expect("an Mlp has a layer")
-    }
-
-    /// Frees the room of the gradients; [`Tape::swap_gradients`] gives it another.
-    pub fn free_gradients(&mut self) {
-        self.deltas.clear();
-    }
-
-    /// Exchanges the room of the gradients, which need not outlive a backward pass.
-    pub fn swap_gradients(&mut self, other: &mut Self) {
-        std::mem::swap(&mut self.deltas, &mut other.deltas);
-    }
-
-    /// Keeps these samples (ascending) for the backward pass, in the leading columns, and forgets the others.
-    pub fn keep(&mut self, samples: &[usize]) {
-        self.values.iter_mut().chain(&mut self.slopes).for_each(|matrix| keep_columns(matrix, samples));
-        self.columns = samples.len();
-    }
 }
 
 impl Mlp {
@@ -88,19 +47,21 @@ impl Mlp {
         if layer + 1 < self.layers.len() { Some(self.activation) } else { self.output }
     }
 
-    /// The weights, for many forward passes with the same parameters.
-    pub fn pack<T: Scalar>(&self, parameters: &[T]) -> Vec<Packed<T>> {
-        self.layers.iter().map(|layer| Packed::new(layer.weights(parameters))).collect()
+    /// The weights, for many forward passes with the same parameters; `packed` is what is replaced.
+    pub fn pack<T: Scalar>(&self, parameters: &[T], packed: &mut Vec<Packed<T>>) {
+        pack(self.layers.iter().map(|layer| layer.weights(parameters)), packed);
     }
 
-    /// The transposed weights, for many backward passes with the same parameters.
-    pub fn pack_transposed<T: Scalar>(&self, parameters: &[T]) -> Vec<Packed<T>> {
-        self.layers.iter().map(|layer| Packed::new(layer.weights(parameters).transposed())).collect()
+    /// As [`Mlp::pack`], of the transposed weights, for backward passes.
+    pub fn pack_transposed<T: Scalar>(&self, parameters: &[T], packed: &mut Vec<Packed<T>>) {
+        pack(self.layers.iter().map(|layer| layer.weights(parameters).transposed()), packed);
     }
 
     /// Runs the stack on `input`, `inputs x samples`; with `slopes`, a backward pass may follow.
     pub fn forward<T: Scalar>(&self, parameters: &[T], input: &DMatrix<T>, tape: &mut Tape<T>, slopes: bool) {
-        self.forward_packed((parameters, &self.pack(parameters)), input, tape, slopes);
+        self.run(parameters, input, tape, slopes, |layer, out, input| {
+            product(out, self.layers[layer].weights(parameters), input, Update::Replace);
+        });
     }
 
     /// As [`Mlp::forward`], with the parameters' [`Mlp::pack`].
@@ -111,12 +72,26 @@ impl Mlp {
         tape: &mut Tape<T>,
         slopes: bool,
     ) {
+        self.run(parameters, input, tape, slopes, |layer, out, input| {
+            weights[layer].multiply(out, input, Update::Replace);
+        });
+    }
+
+    /// A forward pass; `multiply` writes the product of a layer's weights and its input.
+    fn run<T: Scalar>(
+        &self,
+        parameters: &[T],
+        input: &DMatrix<T>,
+        tape: &mut Tape<T>,
+        slopes: bool,
+        multiply: impl Fn(usize, &mut [T], Operand<'_, T>),
+    ) {
         tape.columns = input.ncols();
-        for (index, (layer, weights)) in self.layers.iter().zip(weights).enumerate() {
+        for (index, layer) in self.layers.iter().enumerate() {
             let (before, rest) = tape.values.split_at_mut(index);
             let input = before.last().unwrap_or(input);
             let values = &mut rest[0];
-            weights.multiply(values.as_mut_slice(), input.into(), Update::Replace);
+            multiply(index, values.as_mut_slice(), input.into());
             let bias = layer.bias(parameters);
             match self.activation(index) {
                 Some(activation) => activation.apply(values, slopes.then_some(&mut tape.slopes[index]), bias),
@@ -138,36 +113,56 @@ impl Mlp {
         gradient: Option<&mut [T]>,
         input_gradient: Option<&mut DMatrix<T>>,
     ) {
-        self.backward_packed(&self.pack_transposed(parameters), input, tape, gradient, input_gradient);
+        let below = input_gradient.map(|gradient| (gradient.as_mut_slice(), Update::Replace));
+        self.run_back(input, tape, gradient, below, |layer, out, delta, update| {
+            product(out, self.layers[layer].weights(parameters).transposed(), delta, update);
+        });
     }
 
-    /// As [`Mlp::backward`], with the parameters' [`Mlp::pack_transposed`].
+    /// As [`Mlp::backward`], with the parameters' [`Mlp::pack_transposed`]; the gradient
+    /// with respect to the input is multiplied by `slopes`, entry by entry.
     pub fn backward_packed<T: Scalar>(
         &self,
         transposes: &[Packed<T>],
         input: &DMatrix<T>,
         tape: &mut Tape<T>,
+        gradient: &mut [T],
+        (input_gradient, slopes): (&mut DMatrix<T>, &DMatrix<T>),
+    ) {
+        let below = (input_gradient.as_mut_slice(), Update::Times(slopes.as_slice()));
+        self.run_back(input, tape, Some(gradient), Some(below), |layer, out, delta, update| {
+            transposes[layer].multiply(out, delta, update);
+        });
+    }
+
+    /// A backward pass; `multiply` writes the product of a layer's transposed weights and its delta.
+    fn run_back<T: Scalar>(
+        &self,
+        input: &DMatrix<T>,
+        tape: &mut Tape<T>,
         mut gradient: Option<&mut [T]>,
-        input_gradient: Option<&mut DMatrix<T>>,
+        mut input_gradient: Option<(&mut [T], Update<'_, T>)>,
+        multiply: impl Fn(usize, &mut [T], Operand<'_, T>, Update<'_, T>),
     ) {
         let columns = tape.columns;
-        for (index, (layer, weights)) in self.layers.iter().zip(transposes).enumerate().rev() {
-            if self.activation(index).is_some() {
-                scale(&mut tape.deltas[index], &tape.slopes[index], columns);
-            }
+        if let (Some(_), Some(delta), Some(slopes)) = (self.output, tape.deltas.last_mut(), tape.slopes.last()) {
+            scale(delta, slopes, columns);
+        }
+        for (index, layer) in self.layers.iter().enumerate().rev() {
             let (before, rest) = tape.deltas.split_at_mut(index);
             let delta = Operand::leading(&rest[0], columns);
             if let Some(gradient) = gradient.as_deref_mut() {
                 let input = if index == 0 { input } else { &tape.values[index - 1] };
                 layer.add_gradient(gradient, delta, Operand::leading(input, columns));
             }
-            if let Some(below) = before.last_mut() {
-                weights.multiply(&mut below.as_mut_slice()[..layer.inputs * columns], delta, Update::Replace);
+            let below = match before.last_mut() {
+                Some(below) => Some((below.as_mut_slice(), Update::Times(tape.slopes[index - 1].as_slice()))),
+                None => input_gradient.take(),
+            };
+            if let Some((out, update)) = below {
+                let len = layer.inputs * columns;
+                multiply(index, &mut out[..len], delta, update.within(..len));
             }
-        }
-        if let (Some(input_gradient), [first, ..], [weights, ..]) = (input_gradient, &self.layers[..], transposes) {
-            let input_gradient = &mut input_gradient.as_mut_slice()[..first.inputs * columns];
-            weights.multiply(input_gradient, Operand::leading(&tape.deltas[0], columns), Update::Replace);
         }
     }
 
@@ -189,16 +184,18 @@ impl Linear {
     }
 }
 
-/// Moves the given columns (ascending) to the front.
-pub fn keep_columns<T: Scalar>(matrix: &mut DMatrix<T>, columns: &[usize]) {
-    let rows = matrix.nrows();
-    for (to, &from) in columns.iter().enumerate().filter(|&(to, &from)| to != from) {
-        matrix.as_mut_slice().copy_within(from * rows..(from + 1) * rows, to * rows);
+/// Copies the matrices, into the memory of the copies before them where there are some.
+fn pack<'a, T: Scalar>(matrices: impl Iterator<Item = Operand<'a, T>>, packed: &mut Vec<Packed<T>>) {
+    for (index, matrix) in matrices.enumerate() {
+        match packed.get_mut(index) {
+            Some(packed) => packed.set(matrix),
+            None => packed.push(Packed::new(matrix)),
+        }
     }
 }
 
 /// Multiplies the first `columns` columns by `slopes`, entry by entry.
-pub fn scale<T: Scalar>(delta: &mut DMatrix<T>, slopes: &DMatrix<T>, columns: usize) {
+fn scale<T: Scalar>(delta: &mut DMatrix<T>, slopes: &DMatrix<T>, columns: usize) {
     let len = delta.nrows() * columns;
     for (delta, &slope) in delta.as_mut_slice()[..len].iter_mut().zip(slopes.as_slice()) {
         *delta *= slope;
@@ -214,57 +211,4 @@ fn add_bias<T: Scalar>(values: &mut DMatrix<T>, bias: &[T]) {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::testing::{assert_gradient, fill};
-
-    fn check(activation: Activation, output: Option<Activation>) {
-        let mlp = Mlp::new(&[3, 8, 7, 2], 0, activation, output);
-        let parameters: Vec<f64> = fill(mlp.end(), 1);
-        let input = DMatrix::from_vec(3, 6, fill(18, 2));
-        let seed = DMatrix::from_vec(2, 6, fill(12, 3));
-        let mut tape = mlp.tape(6);
-
-        let loss = |parameters: &[f64], input: &DMatrix<f64>| {
-            let mut tape = mlp.tape(6);
-            mlp.forward(parameters, input, &mut tape, false);
-            tape.output().dot(&seed)
-        };
-        let mut gradient = vec![0.0; mlp.end()];
-        let mut input_gradient = DMatrix::zeros(3, 6);
-        mlp.forward(&parameters, &input, &mut tape, true);
-        tape.output_gradient().copy_from(&seed);
-        mlp.backward(&parameters, &input, &mut tape, Some(&mut gradient), Some(&mut input_gradient));
-
-        assert_gradient(&parameters, &gradient, |parameters| loss(parameters, &input));
-        assert_gradient(input.as_slice(), input_gradient.as_slice(), |values| {
-            loss(&parameters, &DMatrix::from_column_slice(3, 6, values))
-        });
-    }
-
-    #[test]
-    fn gradients_are_those_of_finite_differences() {
-        check(Activation::Mish, None);
-        check(Activation::Mish, Some(Activation::Mish));
-        check(Activation::Mish, Some(Activation::Softplus));
-        check(Activation::Relu, None);
-    }
-
-    #[test]
-    fn a_second_backward_pass_adds_to_the_gradient() {
-        let mlp = Mlp::new(&[2, 3, 1], 0, Activation::Mish, None);
-        let parameters: Vec<f64> = fill(mlp.end(), 1);
-        let input = DMatrix::from_vec(2, 4, fill(8, 2));
-        let mut tape = mlp.tape(4);
-        let mut gradient = vec![0.0; mlp.end()];
-        mlp.forward(&parameters, &input, &mut tape, true);
-        tape.output_gradient().fill(1.0);
-        mlp.backward(&parameters, &input, &mut tape, Some(&mut gradient), None);
-        let once = gradient.clone();
-        tape.output_gradient().fill(1.0);
-        mlp.backward(&parameters, &input, &mut tape, Some(&mut gradient), None);
-        for (twice, once) in gradient.iter().zip(&once) {
-            assert!((twice - 2.0 * once).abs() < 1e-12);
-        }
-    }
-}
+mod tests;

@@ -15,14 +15,16 @@ mod mlp;
 mod product;
 mod scalar;
 mod sinusoid;
+mod tape;
 
 pub use activation::Activation;
 pub use adam::Adam;
 pub use linear::Linear;
-pub use mlp::{Mlp, Tape, keep_columns, scale};
+pub use mlp::Mlp;
 pub use product::{Operand, Packed, Update, product};
 pub use scalar::Scalar;
 pub use sinusoid::{Frequencies, TimeFrequencies, sinusoidal_code};
+pub use tape::{Tape, keep_columns};
 
 /// `target <- rate * online + (1 - rate) * target` (Appendix B, tau).
 pub fn soft_update<T: Scalar>(target: &mut [T], online: &[T], rate: T) {

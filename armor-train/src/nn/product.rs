@@ -1,9 +1,11 @@
 //! Matrix products over pieces of parameter vectors and their transposes.
 
+use std::slice::SliceIndex;
+
 use nalgebra::DMatrix;
 
 use super::Scalar;
-use super::kernel::ROWS;
+use super::kernel::{self, ROWS};
 
 /// A matrix to be read: stored column by column, or the transpose of one that is.
 #[derive(Clone, Copy)]
@@ -39,7 +41,7 @@ impl<'a, T> Operand<'a, T> {
         Self { transposed: !self.transposed, ..self }
     }
 
-    const fn rows(&self) -> usize {
+    pub(super) const fn rows(&self) -> usize {
         if self.transposed { self.count } else { self.stride }
     }
 
@@ -49,6 +51,16 @@ impl<'a, T> Operand<'a, T> {
 
     pub(super) const fn is_transposed(&self) -> bool {
         self.transposed
+    }
+
+    /// All numbers, in the order in which they are stored.
+    pub(super) const fn values(&self) -> &'a [T] {
+        self.values
+    }
+
+    /// Distance in storage from a row to the next, and from a column to the next.
+    pub(super) const fn strides(&self) -> [usize; 2] {
+        if self.transposed { [self.stride, 1] } else { [1, self.stride] }
     }
 
     /// The columns as they are stored: the rows of a transpose.
@@ -67,13 +79,30 @@ impl<'a, T: Scalar> From<&'a DMatrix<T>> for Operand<'a, T> {
     }
 }
 
-/// What becomes of the numbers that a product is written over.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Update {
-    /// They are replaced.
+/// What a product does with the numbers that it is written over.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Update<'a, T> {
+    /// They are replaced by it.
     Replace,
-    /// The product is added to them.
+    /// It is added to them.
     Add,
+    /// They are replaced by its sum with another matrix, as large and stored alike.
+    Plus(&'a [T]),
+    /// They are replaced by it, multiplied entry by entry with another matrix.
+    Times(&'a [T]),
+}
+
+impl<T> Update<'_, T> {
+    /// What holds for some of the numbers.
+    #[inline(always)]
+    pub(super) fn within(self, range: impl SliceIndex<[T], Output = [T]>) -> Self {
+        match self {
+            Self::Replace => Self::Replace,
+            Self::Add => Self::Add,
+            Self::Plus(other) => Self::Plus(&other[range]),
+            Self::Times(other) => Self::Times(&other[range]),
+        }
+    }
 }
 
 /// A left factor of many products, copied into the order in which they read it.
@@ -88,24 +117,33 @@ pub struct Packed<T> {
 impl<T: Scalar> Packed<T> {
     /// A copy of `matrix`.
     pub fn new(matrix: Operand<'_, T>) -> Self {
-        let (rows, depth) = (matrix.rows(), matrix.columns());
-        let mut panels = Vec::with_capacity(rows.div_ceil(ROWS) * depth);
-        for first in (0..rows).step_by(ROWS) {
-            append_panel(&mut panels, matrix, first);
+        let mut packed = Self { rows: 0, depth: 0, panels: Vec::new() };
+        packed.set(matrix);
+        packed
+    }
+
+    /// Replaces the copy by one of `matrix`, in the same memory.
+    pub fn set(&mut self, matrix: Operand<'_, T>) {
+        (self.rows, self.depth) = (matrix.rows(), matrix.columns());
+        self.panels.clear();
+        self.panels.reserve(self.rows.div_ceil(ROWS) * self.depth);
+        for first in (0..self.rows).step_by(ROWS) {
+            append_panel(&mut self.panels, matrix, first);
         }
-        Self { rows, depth, panels }
+    }
+
+    #[cfg(test)]
+    pub(super) fn panels(&self) -> &[[T; ROWS]] {
+        &self.panels
     }
 
     /// Writes the product of the packed matrix and `b` to `out`, column by column.
     ///
     /// # Panics
     /// Unless the dimensions fit.
-    pub fn multiply(&self, out: &mut [T], b: Operand<'_, T>, update: Update) {
-        check(out, [self.rows, self.depth], b);
-        let panels = self.panels.chunks_exact(self.depth);
-        for (first, panel) in (0..self.rows).step_by(ROWS).zip(panels) {
-            T::multiply_panel(out, (first, self.rows), panel, b, update);
-        }
+    pub fn multiply(&self, out: &mut [T], b: Operand<'_, T>, update: Update<'_, T>) {
+        check(out, [self.rows, self.depth], b, update);
+        T::multiply(out, self.rows, &self.panels, b, update);
     }
 }
 
@@ -113,31 +151,53 @@ impl<T: Scalar> Packed<T> {
 ///
 /// # Panics
 /// Unless the dimensions fit.
-pub fn product<T: Scalar>(out: &mut [T], a: Operand<'_, T>, b: Operand<'_, T>, update: Update) {
-    check(out, [a.rows(), a.columns()], b);
-    let mut panel = Vec::with_capacity(a.columns());
-    for first in (0..a.rows()).step_by(ROWS) {
-        panel.clear();
-        append_panel(&mut panel, a, first);
-        T::multiply_panel(out, (first, a.rows()), &panel, b, update);
+pub fn product<T: Scalar>(out: &mut [T], a: Operand<'_, T>, b: Operand<'_, T>, update: Update<'_, T>) {
+    check(out, [a.rows(), a.columns()], b, update);
+    if a.rows() < ROWS && b.is_transposed() && b.columns() >= ROWS {
+        turned_product(out, a, b, update);
+    } else {
+        T::product(out, a, b, update);
     }
 }
 
-fn check<T>(out: &[T], [rows, depth]: [usize; 2], b: Operand<'_, T>) {
+/// [`product`] as the transpose of `b^T a^T`, with the same bits: where `a` has few rows they
+/// would leave most of a panel empty.
+fn turned_product<T: Scalar>(out: &mut [T], a: Operand<'_, T>, b: Operand<'_, T>, update: Update<'_, T>) {
+    let (rows, columns) = (a.rows(), b.columns());
+    let mut turned = vec![T::zero(); out.len()];
+    T::product(&mut turned, b.transposed(), a.transposed(), Update::Replace);
+    let mut sums = [T::zero(); ROWS];
+    for (column, out) in out.chunks_exact_mut(rows).enumerate() {
+        for (row, sum) in sums[..rows].iter_mut().enumerate() {
+            *sum = turned[row * columns + column];
+        }
+        kernel::store(out, &sums, update.within(column * rows..));
+    }
+}
+
+fn check<T>(out: &[T], [rows, depth]: [usize; 2], b: Operand<'_, T>, update: Update<'_, T>) {
     assert_eq!(depth, b.rows(), "inner dimensions agree");
     assert_eq!(out.len(), rows * b.columns(), "the result has rows times columns values");
+    if let Update::Plus(other) | Update::Times(other) = update {
+        assert_eq!(other.len(), out.len(), "the other matrix is as large as the result");
+    }
 }
 
 /// Copies the rows from `first` on, filled up with zeros, to the end of `panels`.
 fn append_panel<T: Scalar>(panels: &mut Vec<[T; ROWS]>, matrix: Operand<'_, T>, first: usize) {
     let height = ROWS.min(matrix.rows() - first);
     if matrix.transposed {
-        let start = panels.len();
-        panels.resize(start + matrix.columns(), [T::zero(); ROWS]);
-        for row in 0..height {
-            for (panel, &value) in panels[start..].iter_mut().zip(matrix.stored_column(first + row)) {
-                panel[row] = value;
-            }
+        // Block by block: a row of a block lies in one line of the cache, and so does a row of a panel.
+        for start in (0..matrix.columns()).step_by(ROWS) {
+            let block: [[T; ROWS]; ROWS] = std::array::from_fn(|row| {
+                let values = if row < height { &matrix.stored_column(first + row)[start..] } else { &[] };
+                match values.first_chunk() {
+                    Some(&values) => values,
+                    None => std::array::from_fn(|place| values.get(place).copied().unwrap_or(T::zero())),
+                }
+            });
+            let depth = ROWS.min(matrix.columns() - start);
+            panels.extend((0..depth).map(|place| block.map(|row| row[place])));
         }
     } else {
         panels.extend(matrix.stored_columns().map(|column| match column[first..].first_chunk() {

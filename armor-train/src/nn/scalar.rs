@@ -4,7 +4,7 @@ use nalgebra::RealField;
 use serde::{Serialize, de::DeserializeOwned};
 
 use super::kernel::{self, ROWS};
-use super::product::{Operand, Update};
+use super::product::{Operand, Packed, Update};
 
 /// f32 to train, f64 to check.
 pub trait Scalar: RealField + Copy + Serialize + DeserializeOwned + 'static {
@@ -26,15 +26,19 @@ pub trait Scalar: RealField + Copy + Serialize + DeserializeOwned + 'static {
     fn of(value: f64) -> Self;
     /// The value in double precision.
     fn to_f64(self) -> f64;
-    /// Writes the product of a panel of rows and of `b` to `out`'s rows `place.0..` of `place.1`.
-    fn multiply_panel(
+    /// Writes the product of a left factor of `rows` rows, in panels, and of `b` to `out`.
+    fn multiply(
         out: &mut [Self],
-        place: (usize, usize),
-        panel: &[[Self; ROWS]],
+        rows: usize,
+        panels: &[[Self; ROWS]],
         b: Operand<'_, Self>,
-        update: Update,
+        update: Update<'_, Self>,
     ) {
-        kernel::multiply_panel(out, place, panel, b, update, |a, b, sum| a * b + sum);
+        kernel::multiply(out, rows, panels, b, update, |a, b, sum| a * b + sum);
+    }
+    /// Writes the product of `a` and `b` to `out`.
+    fn product(out: &mut [Self], a: Operand<'_, Self>, b: Operand<'_, Self>, update: Update<'_, Self>) {
+        Packed::new(a).multiply(out, b, update);
     }
     /// The value of a recorded number.
     fn of_f32(value: f32) -> Self {
@@ -61,14 +65,17 @@ impl Scalar for f32 {
     fn to_f64(self) -> f64 {
         f64::from(self)
     }
-    fn multiply_panel(
+    fn multiply(
         out: &mut [Self],
-        place: (usize, usize),
-        panel: &[[Self; ROWS]],
+        rows: usize,
+        panels: &[[Self; ROWS]],
         b: Operand<'_, Self>,
-        update: Update,
+        update: Update<'_, Self>,
     ) {
-        kernel::multiply_panel_f32(out, place, panel, b, update);
+        kernel::multiply_f32(out, rows, panels, b, update);
+    }
+    fn product(out: &mut [Self], a: Operand<'_, Self>, b: Operand<'_, Self>, update: Update<'_, Self>) {
+        kernel::product_f32(out, a, b, update);
     }
 }
 

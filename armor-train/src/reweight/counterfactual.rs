@@ -63,9 +63,9 @@ impl Counterfactual {
 
     /// Eq. 9 over one mini-batch, `w = min(1 + m / (E[m] + eps), w_max)`, then the
     /// moving average `w_cf <- (1 - ema) w_cf + ema w`; `rows` are the mini-batch.
-    pub fn update(&self, margins: &[f32], rows: &[usize], weights: &mut [f32]) {
-        let mean = rows.iter().map(|&row| f64::from(margins[row])).sum::<f64>() / rows.len() as f64;
-        for &row in rows {
+    pub fn update(&self, margins: &[f32], rows: &[u32], weights: &mut [f32]) {
+        let mean = rows.iter().map(|&row| f64::from(margins[row as usize])).sum::<f64>() / rows.len() as f64;
+        for row in rows.iter().map(|&row| row as usize) {
             let fresh = (1.0 + f64::from(margins[row]) / (mean + EPSILON)).min(self.max);
             weights[row] = ((1.0 - self.ema) * f64::from(weights[row]) + self.ema * fresh) as f32;
         }

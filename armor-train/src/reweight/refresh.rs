@@ -122,7 +122,7 @@ impl Reweighting {
             Averaged::Weight => &mut fresh,
         };
         if self.scales.counterfactual() {
-            let mut looked_at = stream::shuffled(rows, noise, step);
+            let mut looked_at = stream::shuffled(rows as u32, noise, step);
             looked_at.truncate((self.share * rows as f64).ceil() as usize);
             let margins = self.margins(source, critic, (noise, step), &looked_at, rows);
             for mini_batch in looked_at.chunks(self.mini_batch) {
@@ -145,31 +145,34 @@ impl Reweighting {
         source: &Source<'_>,
         critic: (&Critic, &[T]),
         (noise, step): (Noise, u64),
-        looked_at: &[usize],
+        looked_at: &[u32],
         rows: usize,
     ) -> Vec<f32> {
         let mut ascending = looked_at.to_vec();
         ascending.sort_unstable();
-        let shares = ascending.par_chunks(SHARE).map(|share| {
+        let mut found = vec![0.0; ascending.len()];
+        ascending.par_chunks(SHARE).zip(found.par_chunks_mut(SHARE)).for_each(|(share, found)| {
             let mut batch: Batch<T> = source.room(share.len());
             for (sample, &row) in share.iter().enumerate() {
-                source.fill(&mut batch, sample, row, 0.0);
+                source.fill(&mut batch, sample, row as usize, 0.0);
             }
-            let bound: Vec<T> = share.iter().map(|&row| T::of(self.bounds.bound(source.data(), row))).collect();
+            let bound = share.iter().map(|&row| T::of(self.bounds.bound(source.data(), row as usize)));
+            let bound: Vec<T> = bound.collect();
             let draw = |k: usize, sample: usize, out: &mut [T]| {
-                let tick = step * rows as u64 + share[sample] as u64;
+                let tick = step * rows as u64 + u64::from(share[sample]);
                 stream::fill_normal(noise, stream::PERTURBATION + k as u32, tick, out);
             };
             let inputs = (&batch.state, &batch.kappa[..], &batch.action);
             let mut tape = critic.0.tape(share.len());
             let mut margin = vec![T::zero(); share.len()];
             self.counterfactual.margins(critic, inputs, &bound, &draw, &mut tape, &mut margin);
-            margin
+            for (found, margin) in found.iter_mut().zip(margin) {
+                *found = margin.to_f64() as f32;
+            }
         });
-        let found: Vec<Vec<T>> = shares.collect();
         let mut margins = vec![0.0; rows];
-        for (&row, margin) in ascending.iter().zip(found.into_iter().flatten()) {
-            margins[row] = margin.to_f64() as f32;
+        for (row, margin) in ascending.into_iter().zip(found) {
+            margins[row as usize] = margin;
         }
         margins
     }

@@ -18,7 +18,7 @@ impl WeightSummary {
 
     /// Counts all weights.
     pub fn new(weights: &Weights) -> Self {
-        let sorted = Sorted::new(weights.combined.iter().map(|&weight| f64::from(weight)));
+        let sorted = Sorted::new(weights.combined.iter().copied());
         Self { active: weights.active, quantiles: Self::QUANTILES.map(|q| sorted.quantile(q)) }
     }
 }

@@ -1,0 +1,54 @@
+//! What a forward pass leaves behind for the backward pass.
+
+use nalgebra::DMatrix;
+
+use super::Scalar;
+
+/// Values and slopes of a stack of layers, and room for gradients; reused from step to step.
+#[derive(Clone, Debug)]
+pub struct Tape<T: Scalar> {
+    /// Output of each layer.
+    pub(super) values: Vec<DMatrix<T>>,
+    /// Derivative of each layer's activation.
+    pub(super) slopes: Vec<DMatrix<T>>,
+    /// Gradient with respect to each layer's sum.
+    pub(super) deltas: Vec<DMatrix<T>>,
+    /// Columns of the above that hold samples.
+    pub(super) columns: usize,
+}
+
+impl<T: Scalar> Tape<T> {
+    /// The output of the last forward pass, `outputs x samples`.
+    pub fn output(&self) -> &DMatrix<T> {
+        self.values.last().expect("an Mlp has a layer")
+    }
+
+    /// Where the gradient with respect to the output is written before a backward pass.
+    pub fn output_gradient(&mut self) -> &mut DMatrix<T> {
+        self.deltas.last_mut().expect("an Mlp has a layer")
+    }
+
+    /// Frees the room of the gradients; [`Tape::swap_gradients`] gives it another.
+    pub fn free_gradients(&mut self) {
+        self.deltas.clear();
+    }
+
+    /// Exchanges the room of the gradients, which need not outlive a backward pass.
+    pub fn swap_gradients(&mut self, other: &mut Self) {
+        std::mem::swap(&mut self.deltas, &mut other.deltas);
+    }
+
+    /// Keeps these samples (ascending) for the backward pass, in the leading columns, and forgets the others.
+    pub fn keep(&mut self, samples: &[usize]) {
+        self.values.iter_mut().chain(&mut self.slopes).for_each(|matrix| keep_columns(matrix, samples));
+        self.columns = samples.len();
+    }
+}
+
+/// Moves the given columns (ascending) to the front.
+pub fn keep_columns<T: Scalar>(matrix: &mut DMatrix<T>, columns: &[usize]) {
+    let rows = matrix.nrows();
+    for (to, &from) in columns.iter().enumerate().filter(|&(to, &from)| to != from) {
+        matrix.as_mut_slice().copy_within(from * rows..(from + 1) * rows, to * rows);
+    }
+}
