@@ -166,6 +166,10 @@ enum ArmorStatus
    */
   ARMOR_STATUS_LOAD_PRECISION = 44,
   /*
+   The image has no critic to choose among candidates by.
+   */
+  ARMOR_STATUS_LOAD_NO_CRITIC = 45,
+  /*
    The image has no golden trace.
    */
   ARMOR_STATUS_GOLDEN_EMPTY = 60,
@@ -305,6 +309,8 @@ typedef struct {
    */
   int32_t rung;
 } ArmorStep;
+
+
 
 
 

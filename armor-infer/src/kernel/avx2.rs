@@ -12,7 +12,7 @@ use armor_core::fixed::{
     TABLE_STEP_BITS, WIDEN_BITS,
 };
 
-use super::{float, integer};
+use super::{columns, float, integer};
 
 /// Single-precision numbers in a register.
 const LANES: usize = 8;
@@ -36,6 +36,11 @@ impl Avx2 {
     pub(super) fn accumulate(self, weights: &[f32], x: &[f32], out: &mut [f32]) {
         // SAFETY: `self` is the proof that the processor has AVX2.
         unsafe { accumulate(weights, x, out) }
+    }
+
+    pub(super) fn accumulate_columns<const K: usize>(self, weights: &[f32], x: &[[f32; K]], out: &mut [[f32; K]]) {
+        // SAFETY: as above.
+        unsafe { accumulate_columns(weights, x, out) }
     }
 
     pub(super) fn mish(self, values: &mut [f32]) {
@@ -122,6 +127,11 @@ fn load(lanes: &[f32; LANES]) -> __m256 {
 }
 
 #[target_feature(enable = "avx2")]
+fn accumulate_columns<const K: usize>(weights: &[f32], x: &[[f32; K]], out: &mut [[f32; K]]) {
+    columns::accumulate(weights, x, out);
+}
+
+#[target_feature(enable = "avx2")]
 fn mish(values: &mut [f32]) {
     float::mish(values);
 }
@@ -169,6 +179,9 @@ fn sum_in_chunks<T, const N: usize>(
     add: impl Fn(__m256i, &[i8; N], &[T; N]) -> __m256i,
 ) {
     let stride = codes.len().max(1);
+    // Sums without a row of weights stay as they are, in the middle of a block too.
+    let rows = sums.len().min(weights.len() / stride);
+    let sums = sums.get_mut(..rows).unwrap_or_default();
     let tail = codes.get(chunks.len() * N..).unwrap_or_default();
     let (blocks, rest) = sums.as_chunks_mut::<ROWS>();
     let mut groups = weights.chunks_exact(ROWS * stride);

@@ -13,7 +13,7 @@ use armor_core::fixed::{
 };
 
 use super::avx2::Avx2;
-use super::{float, integer};
+use super::{columns, float, integer};
 
 /// Single-precision numbers in a register.
 const LANES: usize = 16;
@@ -52,6 +52,11 @@ impl Avx512 {
     pub(super) fn accumulate(self, weights: &[f32], x: &[f32], out: &mut [f32]) {
         // SAFETY: `self` is the proof that the processor has AVX-512.
         unsafe { accumulate(weights, x, out) }
+    }
+
+    pub(super) fn accumulate_columns<const K: usize>(self, weights: &[f32], x: &[[f32; K]], out: &mut [[f32; K]]) {
+        // SAFETY: as above.
+        unsafe { accumulate_columns(weights, x, out) }
     }
 
     pub(super) fn mish(self, values: &mut [f32]) {
@@ -131,6 +136,11 @@ fn load(lanes: &[f32; LANES]) -> __m512 {
 }
 
 #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl")]
+fn accumulate_columns<const K: usize>(weights: &[f32], x: &[[f32; K]], out: &mut [[f32; K]]) {
+    columns::accumulate(weights, x, out);
+}
+
+#[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl")]
 fn mish(values: &mut [f32]) {
     float::mish(values);
 }
@@ -179,6 +189,9 @@ fn sum_in_chunks<T, const N: usize>(
     add: impl Fn(__m512i, &[T; N], *const i8, u64) -> __m512i,
 ) {
     let stride = stride.max(1);
+    // Sums without a row of weights stay as they are, in the middle of a block too.
+    let rows = sums.len().min(weights.len() / stride);
+    let sums = sums.get_mut(..rows).unwrap_or_default();
     let (blocks, rest) = sums.as_chunks_mut::<ROWS>();
     let groups = weights.chunks_exact(ROWS * stride);
     for (block, group) in blocks.iter_mut().zip(groups) {
