@@ -22,6 +22,10 @@
 #include <stddef.h>
 #include <stdint.h>
 
+/* A controller in the caller's memory. It reads its image in place for as long
+ * as it is used, and has nothing to be released. */
+typedef struct ArmorController ArmorController;
+
 /*
  Most entries of a state vector.
  */
@@ -239,12 +243,6 @@ typedef enum ArmorPrecision ArmorPrecision;
 typedef int32_t ArmorPrecision;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
-
-/*
- A controller in the caller's memory. It reads its image in place for as long
- as it is used, and has nothing to be released.
- */
-typedef struct ArmorController ArmorController;
 
 /*
  What an image says of itself.
