@@ -28,6 +28,7 @@ fi
 part "workspace" cargo test --workspace --locked --no-fail-fast
 part "power cuts" cargo test -q -p firmware-sim --lib --locked -- --nocapture _operation
 part "embedding" tests/embedding.sh
+part "interchange" tests/interchange.sh
 part "link" tests/link.sh
 part "bare metal" tests/bare-metal.sh
 part "no panic" tests/no-panic.sh

@@ -12,6 +12,9 @@
 
 use serde::{Deserialize, Serialize};
 
+/// Most entries of an action vector that an image can say.
+pub const MAX_ACTION: usize = 64;
+
 /// Dimensions of a policy network.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Shape {
@@ -36,7 +39,7 @@ impl Shape {
             value >= 1 && value <= max
         }
         within(self.state, 1024)
-            && within(self.action, 64)
+            && within(self.action, MAX_ACTION as u16)
             && within(self.hidden, 1024)
             && within(self.kappa_hidden, 1024)
             && within(self.kappa_embedding, 1024)

@@ -22,6 +22,10 @@
 #include <stddef.h>
 #include <stdint.h>
 
+/* A controller in the caller's memory. It reads its image in place for as long
+ * as it is used, and has nothing to be released. */
+typedef struct ArmorController ArmorController;
+
 /*
  Most entries of a state vector.
  */
@@ -166,6 +170,10 @@ enum ArmorStatus
    */
   ARMOR_STATUS_LOAD_PRECISION = 44,
   /*
+   The image has no critic to choose among candidates by.
+   */
+  ARMOR_STATUS_LOAD_NO_CRITIC = 45,
+  /*
    The image has no golden trace.
    */
   ARMOR_STATUS_GOLDEN_EMPTY = 60,
@@ -237,12 +245,6 @@ typedef int32_t ArmorPrecision;
 #endif // __cplusplus
 
 /*
- A controller in the caller's memory. It reads its image in place for as long
- as it is used, and has nothing to be released.
- */
-typedef struct ArmorController ArmorController;
-
-/*
  What an image says of itself.
  */
 typedef struct {
@@ -305,6 +307,8 @@ typedef struct {
    */
   int32_t rung;
 } ArmorStep;
+
+
 
 
 

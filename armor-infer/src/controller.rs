@@ -21,28 +21,21 @@
 use core::fmt;
 use core::mem::MaybeUninit;
 
-use armor_core::budget::Budget;
-use armor_core::noise::Noise;
 use armor_core::units::{Cost, CostLimit};
 use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
 
-use crate::denoiser::{Denoiser, NotFinite};
+use crate::control_loop::ControlLoop;
+use crate::denoiser::NotFinite;
 use crate::policy::{LoadError, Policy};
-use crate::sampler::Sampler;
 
 /// A policy in flight: its numbers in flash, its budget, and all the memory it works in.
 ///
 /// The capacities are the largest state and action vectors and the widest
 /// layer of the policies that it may be given.
-pub struct Controller<'a, const STATE: usize, const ACTION: usize, const HIDDEN: usize> {
-    policy: Policy<'a>,
-    budget: Budget,
-    noise: Noise,
-    tick: u64,
-    denoiser: Denoiser<STATE, HIDDEN>,
-    sampler: Sampler<ACTION>,
-}
+pub struct Controller<'a, const STATE: usize, const ACTION: usize, const HIDDEN: usize>(
+    ControlLoop<'a, STATE, ACTION, HIDDEN, 1>,
+);
 
 /// The answer to a control step.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -110,11 +103,7 @@ impl<'a, const STATE: usize, const ACTION: usize, const HIDDEN: usize> Controlle
     /// [`LoadError`] if the policy does not fit the capacities, or the limit
     /// exceeds the budgets that it was trained with.
     pub fn new(policy: Policy<'a>, limit: CostLimit, seed: u64) -> Result<Self, LoadError> {
-        policy.check_capacities(STATE, ACTION, HIDDEN)?;
-        policy.check_limit(limit)?;
-        let mut controller = Self::idle(policy);
-        controller.start(limit, seed);
-        Ok(controller)
+        ControlLoop::new(policy, limit, seed).map(Self)
     }
 
     /// As [`Controller::new`], in place: on a stack that is too small for a controller.
@@ -127,25 +116,21 @@ impl<'a, const STATE: usize, const ACTION: usize, const HIDDEN: usize> Controlle
         limit: CostLimit,
         seed: u64,
     ) -> Result<&'p mut Self, LoadError> {
-        policy.check_capacities(STATE, ACTION, HIDDEN)?;
-        policy.check_limit(limit)?;
+        ControlLoop::<STATE, ACTION, HIDDEN, 1>::admit(&policy, limit)?;
         let controller = place.write(Self::idle(policy));
         controller.start(limit, seed);
         Ok(controller)
     }
 
-    /// A controller whose memory does not suit its policy yet. All that varies
-    /// in it is small, so that the compiler makes it where it is to lie.
+    /// A controller whose memory does not suit its policy yet.
     #[inline(always)]
     pub(crate) const fn idle(policy: Policy<'a>) -> Self {
-        let (budget, noise) = (Budget::new(CostLimit::ZERO), Noise::new(0));
-        Self { policy, budget, noise, tick: 0, denoiser: Denoiser::idle(), sampler: Sampler::new() }
+        Self(ControlLoop::idle(policy))
     }
 
     /// The start of the first episode.
     pub(crate) fn start(&mut self, limit: CostLimit, seed: u64) {
-        self.denoiser.suit(&self.policy);
-        (self.budget, self.noise, self.tick) = (Budget::new(limit), Noise::new(seed), 0);
+        self.0.start(limit, seed);
     }
 
     /// Starts a new episode: the only way to refill the budget.
@@ -153,9 +138,7 @@ impl<'a, const STATE: usize, const ACTION: usize, const HIDDEN: usize> Controlle
     /// # Errors
     /// [`LoadError::LimitAboveTrainedRange`]; the episode before goes on then.
     pub fn new_episode(&mut self, limit: CostLimit, seed: u64) -> Result<(), LoadError> {
-        self.policy.check_limit(limit)?;
-        (self.budget, self.noise, self.tick) = (Budget::new(limit), Noise::new(seed), 0);
-        Ok(())
+        self.0.new_episode(limit, seed)
     }
 
     /// One control step: charges `incurred`, the cost of the step before (0 on
@@ -168,40 +151,12 @@ impl<'a, const STATE: usize, const ACTION: usize, const HIDDEN: usize> Controlle
     /// As [`Controller::step`], by the longest chain of at most `steps` calls
     /// of the denoiser: the caller knows how many its deadline leaves time for.
     pub fn step_within(&mut self, state: &[f32], incurred: f32, steps: usize) -> Step<ACTION> {
-        let charged = self.budget.charge(incurred);
-
-        let mut action = SVector::<f32, ACTION>::zeros();
-        let entries = action.as_mut_slice().get_mut(..usize::from(self.policy.shape.action)).unwrap_or_default();
-        let acted = self.act(state, steps, entries);
-        if acted.is_err() {
-            for (entry, fallback) in entries.iter_mut().zip(self.policy.sections.action_fallback) {
-                *entry = *fallback;
-            }
-        }
-        self.tick = self.tick.wrapping_add(1);
-
-        let fault = acted.err().or(charged.err().map(|_| Fault::InvalidCost));
-        Step { action, kappa: self.kappa(), rung: acted.ok(), fault }
+        self.0.step(state, incurred, steps, |_| Ok(0))
     }
 
     /// What is left of the budget.
     pub const fn kappa(&self) -> Cost {
-        self.budget.remaining()
-    }
-
-    /// Computes the policy's action at this tick and budget, into `action`
-    /// `[A]`; returns the rung that flew.
-    fn act(&mut self, state: &[f32], steps: usize, action: &mut [f32]) -> Result<usize, Fault> {
-        if state.len() != usize::from(self.policy.shape.state) {
-            return Err(Fault::StateLength);
-        }
-        if state.iter().any(|value| !value.is_finite()) {
-            return Err(Fault::StateNotFinite);
-        }
-        let rung = self.policy.rung_within(steps).ok_or(Fault::NoRung)?;
-        self.denoiser.prepare(&self.policy, state, self.budget.remaining())?;
-        self.sampler.run((&self.policy, rung), &mut self.denoiser, (&self.noise, self.tick), action)?;
-        Ok(rung)
+        self.0.kappa()
     }
 }
 

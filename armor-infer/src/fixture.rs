@@ -80,7 +80,7 @@ impl Fixture {
             SectionKind::Hidden2 | SectionKind::Hidden3 => layer(kind, h, h * h + h),
             SectionKind::Output => layer(kind, h, h * a + a),
             SectionKind::Golden => vec![0; 4],
-            SectionKind::BudgetMap => Vec::new(),
+            SectionKind::BudgetMap | SectionKind::Critic => Vec::new(),
         });
         let mut parts = Parts { manifest, contents: contents.into() };
         parts.set_bounds(-1.0, 1.0);

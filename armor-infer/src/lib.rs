@@ -8,7 +8,8 @@
 //!
 //! | paper | here |
 //! |---|---|
-//! | section 3.5, the control loop | `controller.rs` |
+//! | section 3.5, the control loop | `controller.rs`, `control_loop.rs` |
+//! | - (the best of several actions by the critic of Eq. 2) | `best_of.rs` |
 //! | Eq. 12, the reverse process | `sampler.rs` |
 //! | Appendix B, the denoiser | `denoiser/` |
 //! | its products and activations, bit for bit on every machine | `kernel/` |
@@ -55,8 +56,10 @@
 #[cfg(any(test, feature = "std"))]
 extern crate std;
 
+mod best_of;
 #[cfg(feature = "capi")]
 pub mod capi;
+mod control_loop;
 mod controller;
 mod denoiser;
 #[cfg(test)]
@@ -70,6 +73,8 @@ pub mod meter;
 mod policy;
 mod sampler;
 
+pub use best_of::BestOf;
 pub use controller::{Controller, Fault, Step};
 pub use kernel::Kernel;
 pub use policy::{LoadError, Policy};
+pub use sampler::STREAMS;

@@ -56,6 +56,8 @@ pub enum LoadError {
     },
     /// The firmware was built without the number format of the policy.
     Precision(Precision),
+    /// The image has no critic to choose by.
+    NoCritic,
 }
 
 impl fmt::Display for LoadError {
@@ -81,6 +83,9 @@ impl fmt::Display for LoadError {
                 f,
                 "the controller was built without {precision:?}; build armor-infer with the feature float or integer, or export the policy in another precision"
             ),
+            Self::NoCritic => {
+                f.write_str("the image has no critic to choose among candidates by; export it with --critic")
+            }
         }
     }
 }

@@ -6,25 +6,31 @@
 //!
 //! Noise is addressed, not drawn in turn: at control step `tick`, `a^N` is
 //! stream 0, and the `z` of the chain's `i`-th step (from 0) is stream `i + 1`.
+//! Where `K` chains run side by side, those of chain `k` are `k` [`STREAMS`] on.
 
 use armor_core::noise::Noise;
-use armor_core::schedule::ChainStep;
+use armor_core::schedule::{ChainStep, MAX_STEPS};
 
 use crate::denoiser::{Denoiser, NotFinite, front};
 use crate::policy::Policy;
 
-/// The working memory of a run, beside the denoiser's.
-pub(crate) struct Sampler<const ACTION: usize> {
-    eps: [f32; ACTION],
+/// Streams of noise that a chain may take: more than it has steps.
+pub const STREAMS: u32 = 128;
+const _: () = assert!(MAX_STEPS < STREAMS as usize);
+
+/// The working memory of `K` runs, beside the denoiser's.
+pub(crate) struct Sampler<const ACTION: usize, const K: usize> {
+    eps: [[f32; K]; ACTION],
     z: [f32; ACTION],
 }
 
-impl<const ACTION: usize> Sampler<ACTION> {
+impl<const ACTION: usize, const K: usize> Sampler<ACTION, K> {
     pub(crate) const fn new() -> Self {
-        Self { eps: [0.0; ACTION], z: [0.0; ACTION] }
+        Self { eps: [[0.0; K]; ACTION], z: [0.0; ACTION] }
     }
 
-    /// Runs a rung of the policy on a prepared denoiser, into `action` `[A]`.
+    /// Runs a rung of the policy on a prepared denoiser, `K` times, into
+    /// `action`, `[A]` entries of `K`.
     ///
     /// # Errors
     /// [`NotFinite`] if an estimate of the action was not finite before it was
@@ -33,28 +39,42 @@ impl<const ACTION: usize> Sampler<ACTION> {
     pub(crate) fn run<const STATE: usize, const HIDDEN: usize>(
         &mut self,
         (policy, rung): (&Policy<'_>, usize),
-        denoiser: &mut Denoiser<STATE, HIDDEN>,
+        denoiser: &mut Denoiser<STATE, HIDDEN, K>,
         (noise, tick): (&Noise, u64),
-        action: &mut [f32],
+        action: &mut [[f32; K]],
     ) -> Result<(), NotFinite> {
         let bounds = || policy.sections.action_low.iter().zip(policy.sections.action_high);
         let eps = front(&mut self.eps, action.len());
         let z = front(&mut self.z, action.len());
 
-        noise.fill_normal(0, tick, action);
+        draw((noise, tick, 0), z, action, |a, z| *a = z);
         for (stream, step) in (1..).zip(policy.chain(rung)) {
             denoiser.eps(policy, step.n, action, eps);
             for ((a, eps), (low, high)) in action.iter_mut().zip(&*eps).zip(bounds()) {
-                *a = denoise(&step, *a, *eps, *low, *high)?;
+                for (a, eps) in a.iter_mut().zip(eps) {
+                    *a = denoise(&step, *a, *eps, *low, *high)?;
+                }
             }
             if step.sigma != 0.0 {
-                noise.fill_normal(stream, tick, z);
-                for (a, z) in action.iter_mut().zip(&*z) {
-                    *a += step.sigma * z;
-                }
+                draw((noise, tick, stream), z, action, |a, z| *a += step.sigma * z);
             }
         }
         Ok(())
+    }
+}
+
+/// Draws for each of `K` actions from its own stream, into `z` `[A]`, and puts every draw to its entry.
+fn draw<const K: usize>(
+    (noise, tick, stream): (&Noise, u64, u32),
+    z: &mut [f32],
+    action: &mut [[f32; K]],
+    put: impl Fn(&mut f32, f32),
+) {
+    for (column, stream) in (stream..).step_by(STREAMS as usize).enumerate().take(K) {
+        noise.fill_normal(stream, tick, z);
+        for (entry, z) in action.iter_mut().filter_map(|entries| entries.get_mut(column)).zip(&*z) {
+            put(entry, *z);
+        }
     }
 }
 
@@ -97,10 +117,10 @@ mod tests {
     fn run(fixture: &Fixture) -> Vec<f32> {
         let image = fixture.image();
         let policy = Policy::load(&image).unwrap();
-        let mut action = std::vec![0.0; SMALL.action.into()];
-        let (mut denoiser, noise) = (Denoiser::<8, 16>::new(&policy), Noise::new(SEED));
-        Sampler::<4>::new().run((&policy, 0), &mut denoiser, (&noise, TICK), &mut action).unwrap();
-        action
+        let mut action = std::vec![[0.0]; SMALL.action.into()];
+        let (mut denoiser, noise) = (Denoiser::<8, 16, 1>::new(&policy), Noise::new(SEED));
+        Sampler::<4, 1>::new().run((&policy, 0), &mut denoiser, (&noise, TICK), &mut action).unwrap();
+        action.concat()
     }
 
     fn draw(stream: u32) -> [f64; 2] {

@@ -95,6 +95,20 @@ impl Critic {
         Self { state, action, kappa_scale, options, trunks, heads }
     }
 
+    /// The factor on kappa.
+    pub const fn kappa_scale(&self) -> f64 {
+        self.kappa_scale
+    }
+
+    /// The numbers of the trunk and of the heads of reward and long-term cost, layer by layer;
+    /// none for a layout that a policy image cannot hold.
+    pub fn deployed<'a>(&self, parameters: &'a [f32]) -> Option<&'a [f32]> {
+        let CriticOptions { trunk, head_layers, cost_output, .. } = self.options;
+        let fits = trunk == Trunk::Shared && head_layers == 1 && cost_output == CostOutput::Linear;
+        let [_, last] = self.heads.get(Task::LongCost as usize).filter(|_| fits)?;
+        parameters.get(..last.end())
+    }
+
     /// Numbers of the network.
     pub fn size(&self) -> usize {
         self.heads.last().map_or(0, |[_, last]| last.end())

@@ -13,6 +13,7 @@
 //! | section 3, one training step | [`learner`], [`update`] |
 //! | Table 2, hyperparameters | [`config`] |
 //! | a trained policy in integers | [`quantize`] |
+//! | policies from and for other runtimes | [`import`], [`onnx`] |
 
 pub mod actor;
 pub mod batch;
@@ -25,10 +26,12 @@ pub mod data;
 pub mod dual;
 pub mod export;
 pub mod extraction;
+pub mod import;
 pub mod learner;
 pub mod model;
 pub mod nn;
 pub mod normaliser;
+pub mod onnx;
 pub mod pcgrad;
 pub mod phase;
 pub mod quantize;

@@ -59,7 +59,7 @@ impl Parts {
             SectionKind::Scales => Vec::new(),
             SectionKind::Chain => chain.clone(),
             SectionKind::Golden => vec![0; 4],
-            SectionKind::BudgetMap => Vec::new(),
+            SectionKind::BudgetMap | SectionKind::Critic => Vec::new(),
         });
         let provenance = Provenance {
             version: "0.0.0",
@@ -72,6 +72,7 @@ impl Parts {
         let quality = Quality {
             rung: 0,
             limit: Cost::from_raw(5 << 16),
+            candidates: 1,
             episodes: 20,
             reward_normalized: 0.25,
             cost_normalized: 0.5,
@@ -111,6 +112,20 @@ impl Parts {
             words.extend(step.action.iter().take(policy.shape().action.into()).map(|value| value.to_bits()));
         }
         self.sections[SectionKind::Golden as usize] = words;
+        self
+    }
+
+    /// The same with a critic of random weights.
+    pub(crate) fn with_critic(mut self, seed: u64) -> Self {
+        const TRUNK: usize = 12;
+        const HEAD: usize = 9;
+        let [s, a] = [self.manifest.shape.state, self.manifest.shape.action].map(usize::from);
+        let numbers = (s + 1 + a + 1) * TRUNK + (TRUNK + 1) * TRUNK + 4 * ((TRUNK + 1) * HEAD + HEAD + 1);
+        let mut values = vec![0.0; numbers];
+        Noise::new(seed).fill_normal(200, 0, &mut values);
+        let header = [TRUNK as u32, HEAD as u32, 0.05f32.to_bits(), 0.1f32.to_bits()];
+        *self.section(SectionKind::Critic) =
+            header.into_iter().chain(values.iter().map(|value| (0.4 * value).to_bits())).collect();
         self
     }
 

@@ -18,7 +18,7 @@ use armor_core::units::{Cost, CostLimit, Micros};
 use armor_infer::{Fault, LoadError, Policy, Step};
 use thiserror::Error;
 
-use crate::host::{ACTION, HostController};
+use crate::host::{self, ACTION, HostController, Pilot};
 use crate::latency::Latency;
 use crate::plant::Plant;
 use crate::summary::FlightSummary;
@@ -162,15 +162,24 @@ impl Episode {
 /// # Errors
 /// [`FlightError`]
 pub fn fly(image: &PolicyImage<'_>, plan: &FlightPlan) -> Result<Flight, FlightError> {
+    fly_best_of(image, plan, 1)
+}
+
+/// Flies the policy of an image, at every step the best of so many candidates
+/// ([`host::CANDIDATES`]) by the image's critic.
+///
+/// # Errors
+/// [`FlightError`]
+pub fn fly_best_of(image: &PolicyImage<'_>, plan: &FlightPlan, candidates: u8) -> Result<Flight, FlightError> {
     let mut plant = plan.task.plant()?;
     let hold = check(image, plan)?;
-    let mut controller = controller(image, plan)?;
+    let mut controller = host::pilot(image, plan.limit, 0, candidates).map_err(FlightError::Load)?;
     let mut episodes = Vec::new();
     for index in 0..plan.episodes {
         plant.reset(episode_seed(plan.seed, Use::Plant, index));
         let noise_seed = episode_seed(plan.seed, Use::Controller, index);
         controller.new_episode(plan.limit, noise_seed).map_err(FlightError::Load)?;
-        episodes.push(fly_episode(plant.as_mut(), &mut controller, plan, hold));
+        episodes.push(fly_episode(plant.as_mut(), controller.as_mut(), plan, hold));
     }
     let latency = episodes.iter().flat_map(|episode| &episode.ticks).map(|tick| tick.latency).collect();
     let summary = FlightSummary::new(plan, &episodes, &latency);
@@ -201,7 +210,7 @@ pub(crate) fn check(image: &PolicyImage<'_>, plan: &FlightPlan) -> Result<usize,
     Ok((task.rate_hz / plan.rate_hz) as usize)
 }
 
-fn fly_episode(plant: &mut dyn Plant, controller: &mut HostController<'_>, plan: &FlightPlan, hold: usize) -> Episode {
+fn fly_episode(plant: &mut dyn Plant, controller: &mut dyn Pilot, plan: &FlightPlan, hold: usize) -> Episode {
     let task = plan.task;
     let mut state = vec![0.0; task.state];
     let mut episode = Episode::default();

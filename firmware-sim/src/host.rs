@@ -1,8 +1,9 @@
 //! The controller as this host builds it: large enough for every task of the paper.
 
 use armor_core::image::{ImageError, PolicyImage};
+use armor_core::units::CostLimit;
 use armor_infer::golden::{self, GoldenError};
-use armor_infer::{Controller, Policy};
+use armor_infer::{BestOf, Controller, LoadError, Policy, Step};
 use thiserror::Error;
 
 /// The largest state vector that the host's controller senses.
@@ -14,6 +15,61 @@ pub const HIDDEN: usize = 512;
 
 /// The host's controller.
 pub type HostController<'a> = Controller<'a, STATE, ACTION, HIDDEN>;
+
+/// How many candidates the host's controller can draw for an action.
+pub const CANDIDATES: [u8; 5] = [1, 2, 4, 8, 16];
+
+/// What flies: a controller of any number of candidates.
+pub trait Pilot {
+    /// As [`Controller::new_episode`].
+    ///
+    /// # Errors
+    /// [`LoadError`]
+    fn new_episode(&mut self, limit: CostLimit, seed: u64) -> Result<(), LoadError>;
+
+    /// As [`Controller::step_within`].
+    fn step_within(&mut self, state: &[f32], incurred: f32, steps: usize) -> Step<ACTION>;
+}
+
+impl Pilot for HostController<'_> {
+    fn new_episode(&mut self, limit: CostLimit, seed: u64) -> Result<(), LoadError> {
+        self.new_episode(limit, seed)
+    }
+
+    fn step_within(&mut self, state: &[f32], incurred: f32, steps: usize) -> Step<ACTION> {
+        self.step_within(state, incurred, steps)
+    }
+}
+
+impl<const K: usize> Pilot for BestOf<'_, STATE, ACTION, HIDDEN, K> {
+    fn new_episode(&mut self, limit: CostLimit, seed: u64) -> Result<(), LoadError> {
+        self.new_episode(limit, seed)
+    }
+
+    fn step_within(&mut self, state: &[f32], incurred: f32, steps: usize) -> Step<ACTION> {
+        self.step_within(state, incurred, steps)
+    }
+}
+
+/// The controller of an image that draws `candidates` for every action, one of
+/// [`CANDIDATES`] (what is more counts as the most), and takes the best.
+///
+/// # Errors
+/// [`LoadError`]
+pub fn pilot<'a>(
+    image: &PolicyImage<'a>,
+    limit: CostLimit,
+    seed: u64,
+    candidates: u8,
+) -> Result<Box<dyn Pilot + 'a>, LoadError> {
+    Ok(match candidates {
+        0 | 1 => Box::new(HostController::new(Policy::load(image)?, limit, seed)?),
+        2 => Box::new(BestOf::<STATE, ACTION, HIDDEN, 2>::new(image, limit, seed)?),
+        3 | 4 => Box::new(BestOf::<STATE, ACTION, HIDDEN, 4>::new(image, limit, seed)?),
+        5..=8 => Box::new(BestOf::<STATE, ACTION, HIDDEN, 8>::new(image, limit, seed)?),
+        9.. => Box::new(BestOf::<STATE, ACTION, HIDDEN, 16>::new(image, limit, seed)?),
+    })
+}
 
 /// Why bytes are no policy that this host may fly.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]

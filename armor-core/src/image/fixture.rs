@@ -38,8 +38,14 @@ impl Parts {
     pub(super) fn new(shape: Shape) -> Self {
         let schedule = Schedule::vp(shape.steps.into());
         let rungs = [Rung { sampler: Sampler::Ddpm, steps: shape.steps }, Rung { sampler: Sampler::Ddim, steps: 1 }];
-        let quality =
-            Quality { rung: 1, limit: Cost::from_raw(99), episodes: 20, reward_normalized: 0.25, cost_normalized: 0.5 };
+        let quality = Quality {
+            rung: 1,
+            limit: Cost::from_raw(99),
+            candidates: 1,
+            episodes: 20,
+            reward_normalized: 0.25,
+            cost_normalized: 0.5,
+        };
         let manifest = Manifest {
             task: "ball-run",
             release: 7,
@@ -88,6 +94,7 @@ impl Parts {
         contents.push(steps.flat_map(|step| step.to_f32().to_words()).collect());
         let row = (0..GoldenTrace::row_words(s, a) as u32).map(|i| word(14, i));
         contents.push([7, 8, 5 << 16, 1].into_iter().chain(row).collect());
+        contents.push(Vec::new());
         contents.push(Vec::new());
         Self { manifest, contents }
     }

@@ -109,6 +109,8 @@ pub struct Quality {
     pub rung: u8,
     /// Cost limit of the flight.
     pub limit: Cost,
+    /// Actions among which the critic chose at each step; 1 where there was no choice.
+    pub candidates: u8,
     /// Episodes flown.
     pub episodes: u16,
     /// Mean normalised reward (Eq. 17).
@@ -163,11 +165,13 @@ pub enum SectionKind {
     Golden,
     /// Knots from the remaining budget to the condition of the policy; left out where that is the budget itself.
     BudgetMap,
+    /// The critic that a choice between several actions is taken by; left out where no choice is to be taken.
+    Critic,
 }
 
 impl SectionKind {
     /// All sections, in the order in which they lie in an image.
-    pub const ALL: [Self; 15] = [
+    pub const ALL: [Self; 16] = [
         Self::StateNormaliser,
         Self::ActionBounds,
         Self::Kappa1,
@@ -183,11 +187,12 @@ impl SectionKind {
         Self::Chain,
         Self::Golden,
         Self::BudgetMap,
+        Self::Critic,
     ];
 
     /// Whether an image may do without the section; it then has no entry in the table.
     pub(super) const fn is_optional(self) -> bool {
-        matches!(self, Self::BudgetMap)
+        matches!(self, Self::BudgetMap | Self::Critic)
     }
 }
 

@@ -5,6 +5,7 @@
 //! read in place. Bytes are checked once, in [`PolicyImage::new_checked`];
 //! after `Ok` no accessor fails, allocates or copies.
 
+mod critic;
 mod error;
 #[cfg(test)]
 mod fixture;
@@ -17,6 +18,7 @@ mod reader;
 mod sections;
 mod writer;
 
+pub use critic::{Critic, CriticHead, MAX_CRITIC_WIDTH};
 pub use error::ImageError;
 pub use golden::{GoldenRow, GoldenTrace};
 pub use header::{ALIGNMENT, HEADER_BYTES, MAGIC, SECTION_ALIGNMENT, VERSION};
@@ -38,6 +40,7 @@ pub struct PolicyImage<'a> {
     body: &'a [u8],
     manifest: Manifest<'a>,
     sections: Sections<'a>,
+    critic: Option<Critic<'a>>,
 }
 
 impl<'a> PolicyImage<'a> {
@@ -59,8 +62,8 @@ impl<'a> PolicyImage<'a> {
         let padded_length = header::padded_manifest(header.manifest_length).ok_or(ImageError::Header)?;
         let (manifest_bytes, body) = payload.split_at_checked(padded_length).ok_or(ImageError::Header)?;
         let manifest = Manifest::read(manifest_bytes, header.manifest_length)?;
-        let sections = Sections::read(&manifest, body)?;
-        Ok(Self { bytes, body, manifest, sections })
+        let (sections, critic) = Sections::read(&manifest, body)?;
+        Ok(Self { bytes, body, manifest, sections, critic })
     }
 
     /// The exact bytes of the image, without what follows it.
@@ -86,6 +89,11 @@ impl<'a> PolicyImage<'a> {
     /// The numbers, in place.
     pub const fn sections(&self) -> &Sections<'a> {
         &self.sections
+    }
+
+    /// The critic, where the image has one.
+    pub const fn critic(&self) -> Option<&Critic<'a>> {
+        self.critic.as_ref()
     }
 }
 

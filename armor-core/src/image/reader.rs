@@ -65,9 +65,14 @@ impl<'m, 'a> Reader<'m, 'a> {
         Ok(Dense { weights, bias })
     }
 
+    /// Whether the table names this section next.
+    pub(super) fn is_next(&self, kind: SectionKind) -> bool {
+        self.manifest.sections.get(self.next).is_some_and(|section| section.kind == kind)
+    }
+
     /// The knots of the budget map, if the table names it.
     pub(super) fn budget_map(&mut self) -> Result<Option<BudgetMap<'a>>, ImageError> {
-        if self.manifest.sections.get(self.next).is_none_or(|section| section.kind != SectionKind::BudgetMap) {
+        if !self.is_next(SectionKind::BudgetMap) {
             return Ok(None);
         }
         match self.words(SectionKind::BudgetMap, None)?.as_chunks() {

@@ -1,6 +1,7 @@
 //! The numbers of an image, as slices into its bytes.
 
 use super::ImageError;
+use super::critic::Critic;
 use super::golden::GoldenTrace;
 use super::manifest::{Manifest, Precision, SectionKind};
 use super::network::{FloatNetwork, IntegerNetwork, Network};
@@ -59,7 +60,8 @@ impl<'a> Sections<'a> {
         self.chain.get(first..).and_then(|rest| rest.get(..length)).unwrap_or_default()
     }
 
-    pub(super) fn read(manifest: &Manifest<'_>, body: &'a [u8]) -> Result<Self, ImageError> {
+    /// The sections of a policy, and its critic where there is one.
+    pub(super) fn read(manifest: &Manifest<'_>, body: &'a [u8]) -> Result<(Self, Option<Critic<'a>>), ImageError> {
         let [s, a, k, e] = {
             let shape = &manifest.shape;
             [shape.state, shape.action, shape.kappa_hidden, shape.kappa_embedding].map(usize::from)
@@ -82,6 +84,7 @@ impl<'a> Sections<'a> {
         let chain = reader.words(SectionKind::Chain, Some(chain_steps * ChainStep::WORDS))?;
         let golden = GoldenTrace::read(reader.words(SectionKind::Golden, None)?, s, a)?;
         let budget_map = reader.budget_map()?;
+        let critic = Critic::read(manifest, &mut reader)?;
         reader.finish()?;
 
         let (chain, _) = chain.as_chunks();
@@ -99,7 +102,7 @@ impl<'a> Sections<'a> {
         };
         sections.check_bounds()?;
         sections.check_chains(manifest)?;
-        Ok(sections)
+        Ok((sections, critic))
     }
 
     fn check_bounds(&self) -> Result<(), ImageError> {

@@ -65,6 +65,8 @@ pub enum ArmorStatus {
     LoadLimitAboveTrainedRange = 43,
     /// The library was built without the number format of the policy.
     LoadPrecision = 44,
+    /// The image has no critic to choose among candidates by.
+    LoadNoCritic = 45,
 
     /// The image has no golden trace.
     GoldenEmpty = 60,
@@ -88,7 +90,7 @@ pub enum ArmorStatus {
 
 impl ArmorStatus {
     /// Every status.
-    pub(super) const ALL: [Self; 33] = [
+    pub(super) const ALL: [Self; 34] = [
         Self::Ok,
         Self::NullPointer,
         Self::MisalignedPointer,
@@ -114,6 +116,7 @@ impl ArmorStatus {
         Self::LoadHiddenCapacity,
         Self::LoadLimitAboveTrainedRange,
         Self::LoadPrecision,
+        Self::LoadNoCritic,
         Self::GoldenEmpty,
         Self::GoldenKappa,
         Self::GoldenAction,
@@ -159,6 +162,7 @@ impl ArmorStatus {
                 c"the cost limit lies above what the policy was trained with; see cost_limit_max"
             }
             Self::LoadPrecision => c"the library lacks the policy's number format; build it with float and integer",
+            Self::LoadNoCritic => c"the image has no critic to choose among candidates by; export it with --critic",
             Self::GoldenEmpty => c"the image has no golden trace; export it again",
             Self::GoldenKappa => {
                 c"the budget differs from the golden trace; image and library do not match, do not fly"
@@ -224,6 +228,7 @@ impl From<LoadError> for ArmorStatus {
             LoadError::HiddenCapacity { .. } => Self::LoadHiddenCapacity,
             LoadError::LimitAboveTrainedRange { .. } => Self::LoadLimitAboveTrainedRange,
             LoadError::Precision(_) => Self::LoadPrecision,
+            LoadError::NoCritic => Self::LoadNoCritic,
         }
     }
 }

@@ -8,24 +8,24 @@
 use armor_core::image::FloatNetwork;
 use armor_core::units::Cost;
 
-use super::{affine, front, kappa_embedding, normalised};
+use super::{affine, affine_columns, front, kappa_embedding, normalised};
 use crate::policy::Policy;
 
-/// The working memory of a denoiser.
-pub(crate) struct FloatDenoiser<const STATE: usize, const HIDDEN: usize> {
+/// The working memory of a denoiser for `K` noisy actions at a time.
+pub(crate) struct FloatDenoiser<const STATE: usize, const HIDDEN: usize, const K: usize> {
     /// The normalised state `[S]`.
-    state: [f32; STATE],
+    pub(crate) state: [f32; STATE],
     /// `W_s s + W_k e(kappa) + b` of layer 1 `[H]`.
-    context: [f32; HIDDEN],
+    pub(crate) context: [f32; HIDDEN],
     /// Outputs of layers 1 and 3 `[H]`.
-    odd: [f32; HIDDEN],
+    pub(crate) odd: [[f32; K]; HIDDEN],
     /// Outputs of layer 2 `[H]`.
-    even: [f32; HIDDEN],
+    pub(crate) even: [[f32; K]; HIDDEN],
 }
 
-impl<const STATE: usize, const HIDDEN: usize> FloatDenoiser<STATE, HIDDEN> {
+impl<const STATE: usize, const HIDDEN: usize, const K: usize> FloatDenoiser<STATE, HIDDEN, K> {
     pub(super) const fn new() -> Self {
-        Self { state: [0.0; STATE], context: [0.0; HIDDEN], odd: [0.0; HIDDEN], even: [0.0; HIDDEN] }
+        Self { state: [0.0; STATE], context: [0.0; HIDDEN], odd: [[0.0; K]; HIDDEN], even: [[0.0; K]; HIDDEN] }
     }
 
     pub(super) fn prepare(&mut self, policy: &Policy<'_>, network: &FloatNetwork<'_>, state: &[f32], kappa: Cost) {
@@ -33,7 +33,8 @@ impl<const STATE: usize, const HIDDEN: usize> FloatDenoiser<STATE, HIDDEN> {
         for (out, value) in entries.iter_mut().zip(normalised(policy, state)) {
             *out = value;
         }
-        let embedding = kappa_embedding(policy, kappa, &mut self.odd, &mut self.even);
+        let (first, second) = (self.odd.as_flattened_mut(), self.even.as_flattened_mut());
+        let embedding = kappa_embedding(policy, kappa, first, second);
         let context = front(&mut self.context, policy.shape.hidden.into());
         affine(policy.kernel, &network.context_state, entries, context);
         policy.kernel.accumulate(network.context_kappa, embedding, context);
@@ -44,8 +45,8 @@ impl<const STATE: usize, const HIDDEN: usize> FloatDenoiser<STATE, HIDDEN> {
         policy: &Policy<'_>,
         network: &FloatNetwork<'_>,
         n: usize,
-        action: &[f32],
-        eps: &mut [f32],
+        action: &[[f32; K]],
+        eps: &mut [[f32; K]],
     ) {
         let (kernel, h) = (policy.kernel, usize::from(policy.shape.hidden));
         let odd = front(&mut self.odd, h);
@@ -53,15 +54,15 @@ impl<const STATE: usize, const HIDDEN: usize> FloatDenoiser<STATE, HIDDEN> {
 
         let time = network.time_table.get(n.saturating_sub(1) * h..).unwrap_or_default();
         for ((out, time), context) in odd.iter_mut().zip(time).zip(&self.context) {
-            *out = time + context;
+            *out = [time + context; K];
         }
-        kernel.accumulate(network.action_input, action, odd);
-        kernel.mish(odd);
-        affine(kernel, &network.hidden_2, odd, even);
-        kernel.mish(even);
-        affine(kernel, &network.hidden_3, even, odd);
-        kernel.mish(odd);
-        affine(kernel, &network.output, odd, eps);
+        kernel.accumulate_columns(network.action_input, action, odd);
+        kernel.mish(odd.as_flattened_mut());
+        affine_columns(kernel, &network.hidden_2, odd, even);
+        kernel.mish(even.as_flattened_mut());
+        affine_columns(kernel, &network.hidden_3, even, odd);
+        kernel.mish(odd.as_flattened_mut());
+        affine_columns(kernel, &network.output, odd, eps);
     }
 }
 
@@ -127,14 +128,14 @@ mod tests {
             let image = fixture.image();
             let policy = Policy::load(&image).unwrap();
             let (mut state, mut action) = (vec![0.0; shape.state.into()], vec![0.0; shape.action.into()]);
-            let mut denoiser = Denoiser::<16, 256>::new(&policy);
+            let mut denoiser = Denoiser::<16, 256, 1>::new(&policy);
             for n in 1..=usize::from(shape.steps) {
                 Noise::new(2).fill_normal(0, n as u64, &mut state);
                 Noise::new(2).fill_normal(1, n as u64, &mut action);
                 let kappa = Cost::from_incurred(n as f32 * 0.75).unwrap();
                 let mut eps = vec![0.0; action.len()];
                 denoiser.prepare(&policy, &state, kappa).unwrap();
-                denoiser.eps(&policy, n, &action, &mut eps);
+                denoiser.eps(&policy, n, action.as_chunks().0, eps.as_chunks_mut().0);
 
                 let scaled = f64::from(policy.kappa.scale) * f64::from(kappa.to_f32());
                 let expected = reference(image.sections(), &shape, scaled, &state, &action, n);

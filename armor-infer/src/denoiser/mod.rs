@@ -7,6 +7,7 @@ mod float;
 mod integer;
 
 use armor_core::image::{Dense, Network};
+use armor_core::shape::MAX_ACTION;
 use armor_core::units::Cost;
 
 use crate::kernel::Kernel;
@@ -18,13 +19,14 @@ use integer::IntegerDenoiser;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct NotFinite;
 
-/// The working memory of a denoiser, for the number format of its policy.
-pub(crate) enum Denoiser<const STATE: usize, const HIDDEN: usize> {
-    Float(FloatDenoiser<STATE, HIDDEN>),
+/// The working memory of a denoiser, for the number format of its policy and
+/// for `K` noisy actions at a time.
+pub(crate) enum Denoiser<const STATE: usize, const HIDDEN: usize, const K: usize> {
+    Float(FloatDenoiser<STATE, HIDDEN, K>),
     Integer(IntegerDenoiser<STATE, HIDDEN>),
 }
 
-impl<const STATE: usize, const HIDDEN: usize> Denoiser<STATE, HIDDEN> {
+impl<const STATE: usize, const HIDDEN: usize, const K: usize> Denoiser<STATE, HIDDEN, K> {
     /// Memory that no policy has yet.
     pub(crate) const fn idle() -> Self {
         Self::Float(FloatDenoiser::new())
@@ -54,6 +56,9 @@ impl<const STATE: usize, const HIDDEN: usize> Denoiser<STATE, HIDDEN> {
     /// embedding into codes. In single precision such numbers pass on, and the
     /// chain's estimate shows them.
     pub(crate) fn prepare(&mut self, policy: &Policy<'_>, state: &[f32], kappa: Cost) -> Result<(), NotFinite> {
+        if let (Self::Float(_), Network::Integer(_)) = (&*self, &policy.sections.network) {
+            self.suit(policy);
+        }
         match (self, &policy.sections.network) {
             (Self::Float(memory), Network::Float(network)) if cfg!(feature = "float") => {
                 memory.prepare(policy, network, state, kappa);
@@ -67,17 +72,43 @@ impl<const STATE: usize, const HIDDEN: usize> Denoiser<STATE, HIDDEN> {
         }
     }
 
-    /// The noise that the network sees in `action` `[A]` at noise level `n`,
-    /// into `eps` `[A]`, given what [`Denoiser::prepare`] left.
-    pub(crate) fn eps(&mut self, policy: &Policy<'_>, n: usize, action: &[f32], eps: &mut [f32]) {
+    /// The noise that the network sees in each of the actions, `[A]` entries of
+    /// `K`, at noise level `n`, into `eps`, given what [`Denoiser::prepare`] left.
+    pub(crate) fn eps(&mut self, policy: &Policy<'_>, n: usize, action: &[[f32; K]], eps: &mut [[f32; K]]) {
         match (self, &policy.sections.network) {
             (Self::Float(memory), Network::Float(network)) if cfg!(feature = "float") => {
                 memory.eps(policy, network, n, action, eps);
             }
             (Self::Integer(memory), Network::Integer(network)) if cfg!(feature = "integer") => {
-                memory.eps(policy, network, n, action, eps);
+                if K == 1 {
+                    return memory.eps(policy, network, n, action.as_flattened(), eps.as_flattened_mut());
+                }
+                // Integers take one action at a time.
+                let (mut alone, mut answer) = ([0.0; MAX_ACTION], [0.0; MAX_ACTION]);
+                let (alone, answer) = (front(&mut alone, action.len()), front(&mut answer, action.len()));
+                for column in 0..K {
+                    for (out, entry) in alone.iter_mut().zip(action.iter().filter_map(|entry| entry.get(column))) {
+                        *out = *entry;
+                    }
+                    memory.eps(policy, network, n, alone, answer);
+                    for (out, entry) in eps.iter_mut().filter_map(|entry| entry.get_mut(column)).zip(&*answer) {
+                        *out = *entry;
+                    }
+                }
             }
             _ => {}
+        }
+    }
+
+    /// The memory for single precision, made anew where integers are in it;
+    /// the next [`Denoiser::prepare`] finds its own again.
+    pub(crate) fn float_memory(&mut self) -> Option<&mut FloatDenoiser<STATE, HIDDEN, K>> {
+        if let Self::Integer(_) = self {
+            *self = Self::Float(FloatDenoiser::new());
+        }
+        match self {
+            Self::Float(memory) => Some(memory),
+            Self::Integer(_) => None,
         }
     }
 }
@@ -100,7 +131,7 @@ fn kappa_embedding<'m>(policy: &Policy<'_>, kappa: Cost, first: &'m mut [f32], s
 }
 
 /// The normalised entries of a state `[S]`.
-fn normalised<'s>(policy: &Policy<'s>, state: &'s [f32]) -> impl Iterator<Item = f32> + Clone + use<'s> {
+pub(crate) fn normalised<'s>(policy: &Policy<'s>, state: &'s [f32]) -> impl Iterator<Item = f32> + Clone + use<'s> {
     let normaliser = policy.sections.state_mean.iter().zip(policy.sections.state_factor);
     state.iter().zip(normaliser).map(|(value, (mean, factor))| (value - mean) * factor)
 }
@@ -111,8 +142,16 @@ pub(crate) fn front<T>(buffer: &mut [T], length: usize) -> &mut [T] {
     buffer.get_mut(..length).unwrap_or_default()
 }
 
+/// `out = bias + W x` for `K` columns.
+pub(crate) fn affine_columns<const K: usize>(kernel: Kernel, layer: &Dense<'_>, x: &[[f32; K]], out: &mut [[f32; K]]) {
+    for (out, bias) in out.iter_mut().zip(layer.bias) {
+        *out = [*bias; K];
+    }
+    kernel.accumulate_columns(layer.weights, x, out);
+}
+
 /// `out = bias + W x`.
-fn affine(kernel: Kernel, layer: &Dense<'_>, x: &[f32], out: &mut [f32]) {
+pub(crate) fn affine(kernel: Kernel, layer: &Dense<'_>, x: &[f32], out: &mut [f32]) {
     for (out, bias) in out.iter_mut().zip(layer.bias) {
         *out = *bias;
     }
@@ -140,11 +179,11 @@ mod tests {
         let eps = |fixture: &Fixture, kappa: f32| {
             let image = fixture.image();
             let (policy, kappa) = (Policy::load(&image).unwrap(), Cost::from_incurred(kappa).unwrap());
-            let mut denoiser = Denoiser::<16, 256>::new(&policy);
-            let mut eps = [0.0; 2];
+            let mut denoiser = Denoiser::<16, 256, 1>::new(&policy);
+            let mut eps = [[0.0]; 2];
             denoiser.prepare(&policy, &[0.5, -0.5, 1.0], kappa).unwrap();
-            denoiser.eps(&policy, 1, &[0.25, -1.0], &mut eps);
-            eps.map(f32::to_bits)
+            denoiser.eps(&policy, 1, &[[0.25], [-1.0]], &mut eps);
+            eps.map(|[value]| value.to_bits())
         };
         for precision in [Precision::F32, Precision::Int16x8, Precision::Int8] {
             let plain = fixture(SMALL, precision);

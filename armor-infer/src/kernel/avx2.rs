@@ -12,7 +12,7 @@ use armor_core::fixed::{
     TABLE_STEP_BITS, WIDEN_BITS,
 };
 
-use super::{float, integer};
+use super::{columns, float, integer};
 use crate::denoiser::front;
 
 /// Single-precision numbers in a register.
@@ -37,6 +37,11 @@ impl Avx2 {
     pub(super) fn accumulate(self, weights: &[f32], x: &[f32], out: &mut [f32]) {
         // SAFETY: `self` is the proof that the processor has AVX2.
         unsafe { accumulate(weights, x, out) }
+    }
+
+    pub(super) fn accumulate_columns<const K: usize>(self, weights: &[f32], x: &[[f32; K]], out: &mut [[f32; K]]) {
+        // SAFETY: as above.
+        unsafe { accumulate_columns(weights, x, out) }
     }
 
     pub(super) fn mish(self, values: &mut [f32]) {
@@ -120,6 +125,11 @@ fn blocks<'w, 'o, const V: usize>(
 fn load(lanes: &[f32; LANES]) -> __m256 {
     // SAFETY: 32 bytes, and no alignment is needed.
     unsafe { _mm256_loadu_ps(lanes.as_ptr()) }
+}
+
+#[target_feature(enable = "avx2")]
+fn accumulate_columns<const K: usize>(weights: &[f32], x: &[[f32; K]], out: &mut [[f32; K]]) {
+    columns::accumulate(weights, x, out);
 }
 
 #[target_feature(enable = "avx2")]

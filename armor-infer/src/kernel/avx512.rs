@@ -13,7 +13,7 @@ use armor_core::fixed::{
 };
 
 use super::avx2::Avx2;
-use super::{float, integer};
+use super::{columns, float, integer};
 use crate::denoiser::front;
 
 /// Single-precision numbers in a register.
@@ -53,6 +53,11 @@ impl Avx512 {
     pub(super) fn accumulate(self, weights: &[f32], x: &[f32], out: &mut [f32]) {
         // SAFETY: `self` is the proof that the processor has AVX-512.
         unsafe { accumulate(weights, x, out) }
+    }
+
+    pub(super) fn accumulate_columns<const K: usize>(self, weights: &[f32], x: &[[f32; K]], out: &mut [[f32; K]]) {
+        // SAFETY: as above.
+        unsafe { accumulate_columns(weights, x, out) }
     }
 
     pub(super) fn mish(self, values: &mut [f32]) {
@@ -129,6 +134,11 @@ fn blocks<'w, 'o, const V: usize>(
 fn load(lanes: &[f32; LANES]) -> __m512 {
     // SAFETY: 64 bytes, and no alignment is needed.
     unsafe { _mm512_loadu_ps(lanes.as_ptr()) }
+}
+
+#[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl")]
+fn accumulate_columns<const K: usize>(weights: &[f32], x: &[[f32; K]], out: &mut [[f32; K]]) {
+    columns::accumulate(weights, x, out);
 }
 
 #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl")]

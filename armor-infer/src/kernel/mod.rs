@@ -10,6 +10,7 @@ mod avx2;
 #[cfg(all(feature = "std", target_arch = "x86_64"))]
 mod avx512;
 mod check;
+mod columns;
 #[cfg(all(feature = "dsp", target_arch = "arm"))]
 mod cortex_m;
 mod float;
@@ -97,6 +98,24 @@ impl Kernel {
             Self::CortexM => cortex_m::accumulate(weights, x, out),
             #[cfg(all(feature = "dsp", target_arch = "arm", not(target_abi = "eabihf")))]
             Self::CortexM => float::accumulate::<WIDE>(weights, x, out),
+        }
+    }
+
+    /// As [`Kernel::accumulate`] for `K` columns at once: an input has `K`
+    /// values, and so has an output. Each column has the bits that it would
+    /// have alone, but the weights are read once for all.
+    pub(crate) fn accumulate_columns<const K: usize>(self, weights: &[f32], x: &[[f32; K]], out: &mut [[f32; K]]) {
+        if K == 1 {
+            return self.accumulate(weights, x.as_flattened(), out.as_flattened_mut());
+        }
+        match self {
+            Self::Portable => columns::accumulate(weights, x, out),
+            #[cfg(all(feature = "std", target_arch = "x86_64"))]
+            Self::Avx2(kernel) => kernel.accumulate_columns(weights, x, out),
+            #[cfg(all(feature = "std", target_arch = "x86_64"))]
+            Self::Avx512(kernel) => kernel.accumulate_columns(weights, x, out),
+            #[cfg(all(feature = "dsp", target_arch = "arm"))]
+            Self::CortexM => columns::accumulate(weights, x, out),
         }
     }
 

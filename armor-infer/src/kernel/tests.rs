@@ -58,6 +58,35 @@ proptest! {
     }
 
     #[test]
+    fn a_column_has_the_bits_that_it_would_have_alone(inputs in 0usize..90, outputs in 0usize..70) {
+        const K: usize = 5;
+        let (weights, x, start) = (normals(0, inputs * outputs), normals(1, K * inputs), normals(2, K * outputs));
+        let (x, _) = x.as_chunks::<K>();
+        let column = |rows: &[[f32; K]], k: usize| rows.iter().map(|row| row[k]).collect::<Vec<f32>>();
+        for kernel in Kernel::available() {
+            let mut actual = start.as_chunks::<K>().0.to_vec();
+            kernel.accumulate_columns(&weights, x, &mut actual);
+            for k in 0..K {
+                let mut expected = column(start.as_chunks().0, k);
+                naive(&weights, &column(x, k), &mut expected);
+                prop_assert_eq!(bits_of(&column(&actual, k)), bits_of(&expected), "{}", kernel.name());
+            }
+        }
+    }
+
+    #[test]
+    fn sums_without_a_row_of_weights_stay_as_they_are(inputs in 1usize..80, rows in 0usize..9, more in 0usize..9) {
+        let weights: Vec<i8> = (0..inputs * rows).map(|i| i as i8).collect();
+        let codes: Vec<i16> = (0..inputs).map(|i| i as i16).collect();
+        for kernel in Kernel::available() {
+            let (mut sums, mut expected) = (vec![-7; rows + more], vec![-7; rows + more]);
+            integer::sum_rows(&weights, &codes, &mut expected);
+            kernel.sum_rows(Layout::Rows, &weights, &codes, SHORT_BITS, &mut sums);
+            prop_assert_eq!(&sums, &expected, "{}", kernel.name());
+        }
+    }
+
+    #[test]
     fn single_precision_mish_is_the_shared_one(words in proptest::collection::vec(any::<u32>(), 0..70)) {
         // One quiet NaN is another's equal; none has a code or an action.
         let values: Vec<f32> = words.into_iter().map(f32::from_bits).filter(|value| !value.is_nan()).collect();

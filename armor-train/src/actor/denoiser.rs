@@ -171,6 +171,11 @@ impl Denoiser {
         &self.kappa
     }
 
+    /// The time embedding.
+    pub const fn time(&self) -> &Mlp {
+        &self.time
+    }
+
     /// The layer that noisy action, state and both embeddings enter.
     pub const fn first(&self) -> &Linear {
         &self.first

@@ -33,6 +33,10 @@ pub(super) struct Evaluate {
     /// limit, if not given.
     #[arg(long, value_name = "N", default_value_t = usize::MAX, hide_default_value = true)]
     max_steps: usize,
+    /// Candidates for each action, of which the policy's critic takes the best:
+    /// 1, 2, 4, 8 or 16. Of an image it must be exported with --critic.
+    #[arg(long, value_name = "K", default_value_t = 1, value_parser = firmware_sim::cli::candidates)]
+    best_of: u8,
     /// Episodes at each limit.
     #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..))]
     episodes: u32,
@@ -47,13 +51,15 @@ pub(super) struct Evaluate {
 #[derive(Serialize)]
 struct Report {
     policy: PathBuf,
+    best_of: u8,
     flights: Vec<FlightSummary>,
 }
 
 impl Evaluate {
     pub(super) fn run(self, output: Output) -> CommandResult {
         let task = self.task;
-        let bytes = super::run_folder::image(&self.policy, self.data.as_ref(), output)?;
+        let with_critic = self.best_of > 1;
+        let bytes = super::run_folder::image(&self.policy, self.data.as_ref(), with_critic, output)?;
         let image = PolicyImage::new_checked(bytes.as_slice())
             .map_err(|error| format!("{}: {error}", self.policy.display()))?;
         let flyer = Flyer::of(task, output)?;
@@ -68,15 +74,18 @@ impl Evaluate {
                 rate_hz: task.rate_hz,
                 max_steps: self.max_steps,
             };
-            flights.push(flyer.fly(&image, &plan, output)?.summary);
+            flights.push(flyer.fly(&image, &plan, self.best_of, output)?.summary);
         }
-        output.report(&Report { policy: self.policy, flights })
+        output.report(&Report { policy: self.policy, best_of: self.best_of, flights })
     }
 }
 
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "policy              {}", self.policy.display())?;
+        if self.best_of > 1 {
+            write!(f, "\nactions             best of {} by the critic", self.best_of)?;
+        }
         for flight in &self.flights {
             write!(f, "\n\n{flight}")?;
         }

@@ -10,7 +10,8 @@ use serde::Serialize;
 
 use super::misuse;
 use super::run_folder::export_folder;
-use crate::export::{Agreement, released};
+use crate::export::{Agreement, released, with_critic};
+use crate::onnx::onnx;
 use crate::quantize::{COST_BOUND, Drift, REWARD_BOUND, quantize};
 
 /// Write the policy of a run as an image for the controller.
@@ -34,6 +35,13 @@ pub(super) struct Export {
     /// Release number: a robot's chip refuses one below that of its confirmed policy.
     #[arg(long, value_name = "N", default_value_t = 0)]
     release: u32,
+    /// Put the run's critic into the image, for controllers that take the best
+    /// of several actions by it.
+    #[arg(long)]
+    critic: bool,
+    /// Write one denoising step as a graph for other runtimes, too.
+    #[arg(long, value_name = "FILE")]
+    onnx: Option<PathBuf>,
     /// The run's recorded data, if it was moved.
     #[arg(long)]
     data: Option<PathBuf>,
@@ -78,6 +86,7 @@ impl From<Layout> for image::Layout {
 #[derive(Serialize)]
 struct Report {
     image: PathBuf,
+    onnx: Option<PathBuf>,
     release: u32,
     precision: Precision,
     image_bytes: usize,
@@ -93,6 +102,10 @@ impl Export {
             misuse(&"weights in f32 have one layout; leave out --layout, or choose --precision int8 or int16x8");
         }
         let (checkpoint, data, exported) = export_folder(&self.dir, self.data.as_ref(), output)?;
+        let graph = match &self.onnx {
+            Some(_) => onnx(&PolicyImage::new_checked(exported.bytes.as_slice())?)?,
+            None => Vec::new(),
+        };
         let (bytes, agreement, drift) = match self.precision {
             Precision::F32 => (exported.bytes, exported.agreement, Drift::default()),
             precision => {
@@ -101,9 +114,14 @@ impl Export {
                 (quantized.bytes, quantized.agreement, quantized.drift)
             }
         };
+        let bytes = match self.critic {
+            true => with_critic(&PolicyImage::new_checked(bytes.as_slice())?, &checkpoint)?,
+            false => bytes,
+        };
         let bytes = released(&PolicyImage::new_checked(bytes.as_slice())?, self.release)?;
         let report = Report {
             image: self.output,
+            onnx: self.onnx,
             release: self.release,
             precision: self.precision,
             image_bytes: bytes.as_slice().len(),
@@ -122,6 +140,9 @@ impl Export {
             .into());
         }
         file::write(&report.image, bytes.as_slice())?;
+        if let Some(path) = &report.onnx {
+            file::write(path, &graph)?;
+        }
         output.report(&report)
     }
 }
@@ -129,6 +150,9 @@ impl Export {
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "image               {}", self.image.display())?;
+        if let Some(path) = &self.onnx {
+            writeln!(f, "graph               {}", path.display())?;
+        }
         writeln!(f, "size                {:>10} bytes", self.image_bytes)?;
         writeln!(f, "trained             {:>10} steps", self.steps)?;
         let Agreement { agreement_max_abs, agreement_rms, agreement_samples } = self.agreement;

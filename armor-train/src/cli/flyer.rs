@@ -4,7 +4,7 @@ use std::error::Error;
 
 use armor_core::image::PolicyImage;
 use firmware_sim::cli::output::Output;
-use firmware_sim::flight::{Flight, FlightPlan, fly};
+use firmware_sim::flight::{Flight, FlightPlan, fly_best_of};
 use firmware_sim::simulator::{self, Environment};
 use firmware_sim::task::{Task, World};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -34,10 +34,16 @@ impl Flyer {
         &self,
         image: &PolicyImage<'_>,
         plan: &FlightPlan,
+        best_of: u8,
         output: Output,
     ) -> Result<Flight, Box<dyn Error>> {
         let environment = match self {
-            Self::Native => return Ok(fly(image, plan)?),
+            Self::Native => return Ok(fly_best_of(image, plan, best_of)?),
+            Self::Simulator(_) if best_of > 1 => {
+                return Err(
+                    "in a simulator a policy flies its own action; take the best of several on a native task".into()
+                );
+            }
             Self::Simulator(environment) => environment,
         };
         let bar = ProgressBar::with_draw_target(Some(plan.episodes.into()), ProgressDrawTarget::stderr());

@@ -6,6 +6,7 @@ mod evaluate;
 mod export;
 mod fit;
 mod flyer;
+mod import;
 mod options;
 mod progress;
 mod quickstart;
@@ -40,6 +41,7 @@ enum Command {
     Options(options::Options),
     Calibrate(calibrate::Calibrate),
     Export(export::Export),
+    Import(import::Import),
     Evaluate(evaluate::Evaluate),
     Report(report::Report),
     Study(study::Study),
@@ -56,6 +58,7 @@ pub fn main() -> ExitCode {
         Command::Options(command) => command.run(output),
         Command::Calibrate(command) => command.run(output),
         Command::Export(command) => command.run(output),
+        Command::Import(command) => command.run(output),
         Command::Evaluate(command) => command.run(output),
         Command::Report(command) => command.run(output),
         Command::Study(command) => command.run(output),

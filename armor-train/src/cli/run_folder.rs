@@ -2,12 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
+use armor_core::image::PolicyImage;
 use firmware_sim::cli::output::Output;
 use firmware_sim::memory::AlignedBytes;
 
 use crate::calibrate::Knots;
 use crate::data::Dataset;
-use crate::export::{Exported, export};
+use crate::export::{Exported, export, with_critic};
 use crate::run::{Checkpoint, RunError};
 
 /// The policy of the last checkpoint in `folder`, exported in memory; `data`
@@ -43,11 +44,19 @@ fn same_data(checkpoint: &Checkpoint, data: &Dataset, folder: &Path) -> Result<(
     Err(RunError::OtherData { folder: folder.into() })
 }
 
-/// The image in a file, or of a run's folder.
+/// The image in a file, or of a run's folder, there with its critic if that is asked for.
 pub(super) fn image(
     path: &Path,
     data: Option<&PathBuf>,
+    critic: bool,
     output: Output,
 ) -> Result<AlignedBytes, Box<dyn std::error::Error>> {
-    if path.is_dir() { Ok(export_folder(path, data, output)?.2.bytes) } else { Ok(AlignedBytes::read(path)?) }
+    if !path.is_dir() {
+        return Ok(AlignedBytes::read(path)?);
+    }
+    let (checkpoint, _, Exported { bytes, .. }) = export_folder(path, data, output)?;
+    if !critic {
+        return Ok(bytes);
+    }
+    Ok(with_critic(&PolicyImage::new_checked(bytes.as_slice())?, &checkpoint)?)
 }

@@ -154,7 +154,7 @@ fn fly_all(
     let flights = study.max_steps.iter().map(|&max_steps| {
         let (episodes, seed) = (study.episodes, run.config.seed);
         let plan = FlightPlan { task, limit, episodes, seed, rate_hz: task.rate_hz, max_steps };
-        Ok(Flown::new(max_steps, &flyer.fly(&image, &plan, output)?.summary))
+        Ok(Flown::new(max_steps, &flyer.fly(&image, &plan, 1, output)?.summary))
     });
     flights.collect()
 }

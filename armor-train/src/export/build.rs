@@ -1,21 +1,19 @@
 //! Makes the image, measures it, and makes it again with what was measured.
 
 use armor_core::image::{
-    KappaRange, Layout, MAX_RUNGS, Manifest, PolicyImage, Precision, Provenance, Quality, Rung, SECTION_ALIGNMENT,
+    KappaRange, Layout, MAX_RUNGS, Manifest, PolicyImage, Precision, Provenance, Rung, SECTION_ALIGNMENT,
     SECTION_COUNT, SectionKind, write,
 };
 use armor_core::schedule::Sampler;
 use armor_core::shape::Shape;
 use armor_core::units::{Cost, CostLimit};
 use armor_infer::Policy;
-use firmware_sim::flight::{FlightPlan, fly};
-use firmware_sim::task::Task;
 use heapless::Vec as FixedVec;
 use sha2::{Digest, Sha256};
 
 use super::agreement::{AGREEMENT_BOUND, Agreement, agreement};
 use super::sections::sections;
-use super::{ExportError, ImageBytes, golden};
+use super::{ExportError, ImageBytes, golden, quality};
 use crate::actor::Actor;
 use crate::calibrate::Knots;
 use crate::config::Config;
@@ -27,8 +25,6 @@ use crate::run::Checkpoint;
 
 /// Steps of the rungs below the trained chain.
 const SHORTER: [u16; 4] = [10, 5, 2, 1];
-/// Episodes of the flight behind the quality card, as in the paper (Table 3).
-const QUALITY_EPISODES: u16 = 20;
 /// Bytes of an image beyond its sections: header, manifest and padding are far below.
 const OVERHEAD: usize = 4096;
 
@@ -58,8 +54,10 @@ pub fn export(checkpoint: &Checkpoint, data: &Dataset, map: Option<&Knots>) -> R
     let normaliser = Normaliser::new(data, config.normalize_states);
     let manifest = manifest(checkpoint, &actor, data);
 
+    let network = (&actor.denoiser, &actor.process, parameters);
+
     // A trace without rows, to have an image that the controller can fly.
-    let draft = build(&manifest, &sections(&actor, parameters, &normaliser, &manifest.rungs, [&[0; 4], &budget_map]))?;
+    let draft = build(&manifest, &sections(network, &normaliser, &manifest.rungs, [&[0; 4], &budget_map]))?;
     let image = PolicyImage::new_checked(draft.as_slice()).map_err(armor_core::image::WriteError::Invalid)?;
     let policy = Policy::load(&image)?;
     let limit = flyable_limit(config, &manifest);
@@ -72,39 +70,15 @@ pub fn export(checkpoint: &Checkpoint, data: &Dataset, map: Option<&Knots>) -> R
 
     let quality = quality(&image, limit, config.seed)?;
     let manifest = Manifest { agreement_max_abs: agreement.agreement_max_abs, quality, ..manifest };
-    let bytes = build(&manifest, &sections(&actor, parameters, &normaliser, &manifest.rungs, [&trace, &budget_map]))?;
+    let bytes = build(&manifest, &sections(network, &normaliser, &manifest.rungs, [&trace, &budget_map]))?;
     Ok(Exported { bytes, agreement })
 }
 
 /// The ladder of a network with `steps` noise levels: the trained chain, then shorter deterministic ones.
-fn ladder(steps: u16) -> FixedVec<Rung, MAX_RUNGS> {
+pub(crate) fn ladder(steps: u16) -> FixedVec<Rung, MAX_RUNGS> {
     let trained = Rung { sampler: Sampler::Ddpm, steps };
     let shorter = SHORTER.into_iter().filter(|&length| length < steps);
     [trained].into_iter().chain(shorter.map(|steps| Rung { sampler: Sampler::Ddim, steps })).collect()
-}
-
-/// How each rung flies on the task's native plant; empty where there is none.
-pub(crate) fn quality(
-    image: &PolicyImage<'_>,
-    limit: CostLimit,
-    seed: u64,
-) -> Result<FixedVec<Quality, MAX_RUNGS>, ExportError> {
-    let native = Task::named(image.manifest().task).ok().filter(|task| task.plant().is_ok());
-    let Some(task) = native else { return Ok(FixedVec::new()) };
-    let flown = image.manifest().rungs.iter().enumerate().map(|(rung, chain)| {
-        let max_steps = chain.steps.into();
-        let plan =
-            FlightPlan { task, limit, episodes: QUALITY_EPISODES.into(), seed, rate_hz: task.rate_hz, max_steps };
-        let summary = fly(image, &plan)?.summary;
-        Ok(Quality {
-            rung: rung as u8,
-            limit: limit.cost(),
-            episodes: QUALITY_EPISODES,
-            reward_normalized: summary.reward_normalized as f32,
-            cost_normalized: summary.cost_normalized as f32,
-        })
-    });
-    flown.collect()
 }
 
 /// The trained limit, or the largest budget of the data where that is smaller.

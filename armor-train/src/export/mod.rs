@@ -6,7 +6,9 @@
 
 mod agreement;
 mod build;
+mod critic;
 mod golden;
+mod quality;
 mod sections;
 
 use armor_core::image::{SectionKind, WriteError};
@@ -15,8 +17,11 @@ use firmware_sim::memory::AlignedBytes;
 
 pub use agreement::{AGREEMENT_BOUND, AGREEMENT_SAMPLES, Agreement, agreement};
 pub use build::{Exported, export, released};
-pub(crate) use build::{build, quality};
-pub(crate) use golden::record as record_golden;
+pub(crate) use build::{build, ladder};
+pub use critic::with_critic;
+pub(crate) use golden::{fly_golden, record as record_golden};
+pub(crate) use quality::quality;
+pub(crate) use sections::sections;
 
 /// Why a policy could not be exported.
 #[derive(Debug, thiserror::Error)]
@@ -55,6 +60,11 @@ pub enum ExportError {
         "the policy is conditioned on the price of cost and has no map from the budget to it yet; run `armor-train calibrate` on the run's folder first"
     )]
     NotCalibrated,
+    /// An image has no room for this critic.
+    #[error(
+        "an image holds only a critic with critic_trunk = \"shared\", head_layers = 1 and cost_output = \"linear\"; train with these, or export without --critic"
+    )]
+    CriticLayout,
     /// The data has no trajectory.
     #[error("the data has no trajectory to take a golden trace from")]
     NoTrajectory,

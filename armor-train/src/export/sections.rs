@@ -5,20 +5,19 @@
 
 use armor_core::image::{Rung, SECTION_COUNT, SectionKind};
 
-use crate::actor::Actor;
+use crate::actor::Process;
+use crate::actor::denoiser::Denoiser;
 use crate::nn::Linear;
 use crate::normaliser::Normaliser;
 
 /// The sections of a policy in the order of [`SectionKind::ALL`]; the golden trace is `golden`,
 /// the knots of a budget map `map`, empty where there is none.
-pub(super) fn sections(
-    actor: &Actor,
-    parameters: &[f32],
+pub(crate) fn sections(
+    (denoiser, process, parameters): (&Denoiser, &Process, &[f32]),
     normaliser: &Normaliser,
     rungs: &[Rung],
     [golden, map]: [&[u32]; 2],
 ) -> [Vec<u32>; SECTION_COUNT] {
-    let denoiser = &actor.denoiser;
     let widths = denoiser.widths();
     let first = denoiser.first();
     let [of_action, of_state, of_kappa, _] = denoiser.blocks();
@@ -44,11 +43,12 @@ pub(super) fn sections(
         SectionKind::Output => layer(&body[2]),
         SectionKind::Scales => Vec::new(),
         SectionKind::Chain => {
-            let chain = |rung: &Rung| actor.process.chain(rung.sampler, rung.steps.into());
+            let chain = |rung: &Rung| process.chain(rung.sampler, rung.steps.into());
             rungs.iter().flat_map(chain).flat_map(|step| step.to_f32().to_words()).collect()
         }
         SectionKind::Golden => golden.to_vec(),
         SectionKind::BudgetMap => map.to_vec(),
+        SectionKind::Critic => Vec::new(),
     })
 }
 

@@ -40,7 +40,10 @@ pub struct RungDrift {
 
 impl Drift {
     pub(super) fn new(float: &[Quality], integer: &[Quality]) -> Self {
-        let pairs = float.iter().zip(integer);
+        // A choice by the critic may fall otherwise for the least difference.
+        let plain = |flights: &[Quality]| flights.iter().copied().filter(|flight| flight.candidates == 1).collect();
+        let (float, integer): (Vec<_>, Vec<_>) = (plain(float), plain(integer));
+        let pairs = float.iter().zip(&integer);
         Self(
             pairs
                 .map(|(float, integer)| RungDrift {
@@ -104,7 +107,14 @@ mod tests {
     use super::*;
 
     fn flown(rung: u8, reward_normalized: f32, cost_normalized: f32) -> Quality {
-        Quality { rung, limit: Cost::from_raw(5 << 16), episodes: 20, reward_normalized, cost_normalized }
+        Quality {
+            rung,
+            limit: Cost::from_raw(5 << 16),
+            candidates: 1,
+            episodes: 20,
+            reward_normalized,
+            cost_normalized,
+        }
     }
 
     #[test]

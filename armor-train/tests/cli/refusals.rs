@@ -244,3 +244,22 @@ fn a_policy_flies_its_own_native_task_within_the_limits_it_was_trained_with() {
     }
     assert!(refused("none.armor", &["ball-run"]).contains("none.armor"));
 }
+
+#[test]
+fn a_policy_that_cannot_be_imported_is_named_and_nothing_is_written() {
+    let bench = Bench::new();
+    let interchange = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/interchange");
+    let whole = std::fs::read(interchange.join("policy.safetensors")).unwrap();
+    bench.put("cut.safetensors", &whole[..whole.len() / 2]);
+    bench.put("policy.toml", b"task = \"elsewhere\"\nsteps = 20\n");
+    let tensors = interchange.join("policy.safetensors").display().to_string();
+    let description = interchange.join("policy.toml").display().to_string();
+    let import = |tensors: &str, description: &str| {
+        bench.failure(&["import", tensors, "--description", description, "-o", "x.armor"])
+    };
+    assert!(import("cut.safetensors", &description).contains("cut.safetensors: no safetensors file"));
+    assert!(import("none.safetensors", &description).contains("cannot read none.safetensors"));
+    assert!(import(&tensors, "policy.toml").contains("missing field `cost_limit_max`"));
+    bench.misuse(&["import", "cut.safetensors", "-o", "x.armor"]);
+    assert_eq!(bench.names("."), ["cut.safetensors", "policy.toml", "small.hdf5"]);
+}

@@ -58,6 +58,7 @@ struct Provenance {
 #[derive(Serialize)]
 struct Flown {
     rung: u8,
+    candidates: u8,
     cost_limit: f32,
     episodes: u16,
     reward_normalized: f32,
@@ -90,6 +91,7 @@ impl Report {
         };
         let flown = |quality: &Quality| Flown {
             rung: quality.rung,
+            candidates: quality.candidates,
             cost_limit: quality.limit.to_f32(),
             episodes: quality.episodes,
             reward_normalized: quality.reward_normalized,
@@ -157,8 +159,12 @@ impl fmt::Display for Report {
         writeln!(f, "agreement     {:.1e} between {other} and image", self.agreement_max_abs)?;
         writeln!(f, "golden trace  {} rows", self.golden_rows)?;
         for flown in &self.quality {
-            let Flown { rung, cost_limit, episodes, reward_normalized, cost_normalized } = flown;
-            writeln!(f, "flown         rung {rung} in {:?}, limit {cost_limit}, {episodes} episodes", self.precision)?;
+            let Flown { rung, candidates, cost_limit, episodes, reward_normalized, cost_normalized } = flown;
+            write!(f, "flown         rung {rung} in {:?}, limit {cost_limit}, {episodes} episodes", self.precision)?;
+            if *candidates > 1 {
+                write!(f, ", best of {candidates}")?;
+            }
+            writeln!(f)?;
             writeln!(f, "              reward {reward_normalized:.3}, cost {cost_normalized:.3} (normalised)")?;
         }
         write!(f, "section             offset     bytes")?;

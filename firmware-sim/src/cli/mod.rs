@@ -22,6 +22,7 @@ use armor_core::units::CostLimit;
 use clap::{Parser, Subcommand};
 
 use crate::board::{Board, UnknownBoard};
+use crate::host::CANDIDATES;
 use crate::summary::HOST;
 use crate::task::{Task, TaskError};
 use output::Output;
@@ -90,6 +91,18 @@ fn task(name: &str) -> Result<&'static Task, TaskError> {
 /// What is wrong with the text, for clap to show.
 pub fn limit(text: &str) -> Result<CostLimit, Box<dyn std::error::Error + Send + Sync>> {
     Ok(CostLimit::new(text.parse()?)?)
+}
+
+/// A number of candidates as an argument.
+///
+/// # Errors
+/// What is wrong with the text, for clap to show.
+pub fn candidates(text: &str) -> Result<u8, Box<dyn std::error::Error + Send + Sync>> {
+    let candidates = text.parse()?;
+    if !CANDIDATES.contains(&candidates) {
+        return Err("the best of 1, 2, 4, 8 or 16 candidates can be taken".into());
+    }
+    Ok(candidates)
 }
 
 /// A sampler as reports write it.

@@ -15,7 +15,7 @@ use crate::fault::Injection;
 use crate::file;
 use crate::flight::{FlightPlan, check};
 use crate::harness::{Device, RobotFlight, Setup, Tally, fly_all};
-use crate::host::HostController;
+use crate::host::{self, HostController};
 use crate::latency::Latency;
 use crate::page::flight::{self, Told};
 use crate::summary::{FlightSummary, HOST};
@@ -46,6 +46,10 @@ pub(super) struct Run {
     /// limit, if not given.
     #[arg(long, value_name = "N", default_value_t = usize::MAX, hide_default_value = true)]
     max_steps: usize,
+    /// Candidates for each action, of which the image's critic takes the best:
+    /// 1, 2, 4, 8 or 16.
+    #[arg(long, value_name = "K", default_value_t = 1, value_parser = super::candidates)]
+    best_of: u8,
     /// Cost that an episode may incur; the paper's limit for the task, if not given.
     #[arg(long, value_name = "D", value_parser = super::limit)]
     limit: Option<CostLimit>,
@@ -103,6 +107,9 @@ impl Run {
     pub(super) fn run(self, output: Output) -> CommandResult {
         let task = self.task;
         task.plant()?;
+        if self.board.is_some() && self.best_of > 1 {
+            return Err("the boards' models time a single action; fly the best of several on the host".into());
+        }
         let limit = self.limit.map_or_else(|| CostLimit::new(task.cost_limit), Ok)?;
         let rate_hz = self.rate.unwrap_or(task.rate_hz);
         let plan =
@@ -117,6 +124,7 @@ impl Run {
             if let Some(board) = self.board {
                 board.check_fit(image.bytes().len(), HostController::RAM_BYTES)?;
             }
+            host::pilot(&image, plan.limit, 0, self.best_of)?;
         }
         chip.write(&self.chip)?;
         let boot = boot?;
@@ -126,7 +134,8 @@ impl Run {
         output.note(format_args!("booted slot {}, {} golden rows bit for bit", boot.slot, boot.golden_rows));
         let image = PolicyImage::new_checked(boot.image.as_slice())?;
         let setup = Setup::new(&plan, &image, self.board, self.fault.clone())
-            .with_transport(&plan, Duration::from_micros(self.transport_us));
+            .with_transport(&plan, Duration::from_micros(self.transport_us))
+            .with_candidates(self.best_of);
         if setup.steps_in_time(&plan, &image) == 0 {
             output.note("no chain ends in time, so the fallback will fly; export in integers, lower");
             output.note("--rate or choose a faster --board");

@@ -14,7 +14,7 @@ use armor_core::noise::{Noise, below, uniform};
 use armor_core::units::{Cost, CostLimit};
 use armor_infer::journal::Journal;
 use armor_infer::meter::CostMeter;
-use armor_infer::{Fault, Policy, Step};
+use armor_infer::{Fault, Step};
 
 use super::clock::Agenda;
 use super::deadline::Deadline;
@@ -24,7 +24,7 @@ use super::{Setup, rung_times};
 use crate::fault::FaultKind;
 use crate::flash::NorModel;
 use crate::flight::{FlightError, FlightPlan};
-use crate::host::{ACTION, HostController};
+use crate::host::{self, ACTION, Pilot};
 
 /// Answers without a chain in which the last action is held.
 const HOLDS: u32 = 3;
@@ -150,9 +150,8 @@ impl<'s> Firmware<'s> {
         (robot, agenda): (&mut Robot<'_>, &mut Agenda<Event>),
         journal: &mut Option<Journal<NorModel>>,
     ) -> Result<End, FlightError> {
-        let policy = Policy::load(image).map_err(FlightError::Load)?;
-        let mut controller =
-            HostController::new(policy, CostLimit::from_cost(self.kappa), seed).map_err(FlightError::Load)?;
+        let limit = CostLimit::from_cost(self.kappa);
+        let mut controller = host::pilot(image, limit, seed, self.setup.candidates).map_err(FlightError::Load)?;
         while let Some(event) = agenda.next() {
             let now = agenda.now();
             match event {
@@ -176,7 +175,7 @@ impl<'s> Firmware<'s> {
                     }
                     self.sample(image.sections(), robot, agenda);
                 }
-                Event::Receive => self.receive(image, &mut controller, robot, agenda),
+                Event::Receive => self.receive(image, controller.as_mut(), robot, agenda),
                 Event::Answer => {
                     if let Some(end) = self.release(image.sections(), robot, agenda, journal) {
                         return Ok(end);
@@ -219,7 +218,7 @@ impl<'s> Firmware<'s> {
     fn receive(
         &mut self,
         image: &PolicyImage<'_>,
-        controller: &mut HostController<'_>,
+        controller: &mut dyn Pilot,
         robot: &mut Robot<'_>,
         agenda: &mut Agenda<Event>,
     ) {

@@ -85,6 +85,8 @@ pub struct Setup {
     pub watchdog: Duration,
     /// How far below kappa the journal's floor lies.
     pub reserve: Reserve,
+    /// Candidates for each action ([`crate::host::CANDIDATES`]).
+    pub candidates: u8,
     /// Time from a reset to the first sample.
     boot: Duration,
 }
@@ -142,6 +144,7 @@ impl Setup {
             transport: Duration::ZERO,
             watchdog: 3 * period,
             reserve: Reserve { step: Cost::ZERO, ahead: worst_cost() },
+            candidates: 1,
             boot,
         };
         setup.reserve.step = worst_cost().saturating_mul(setup.blind_steps(plan));
@@ -159,6 +162,13 @@ impl Setup {
     /// Steps of the longest chain that ends in time; 0 if there is none.
     pub fn steps_in_time(&self, plan: &FlightPlan, image: &PolicyImage<'_>) -> usize {
         Deadline::new(rung_times(image, self, plan.max_steps), self.answer_time(plan)).steps()
+    }
+
+    /// The same with the best of so many candidates for each action.
+    #[must_use]
+    pub const fn with_candidates(mut self, candidates: u8) -> Self {
+        self.candidates = candidates;
+        self
     }
 
     /// Time between samples.

@@ -31,7 +31,7 @@ pub struct FloatReference {
     rungs: Vec<Vec<ChainStep>>,
 }
 
-struct Layer {
+pub(super) struct Layer {
     weights: DMatrix<f64>,
     bias: DVector<f64>,
 }
@@ -63,10 +63,10 @@ impl FloatReference {
         }
     }
 
-    pub(super) fn chain(&self, rung: usize, state: &[f32], kappa: Cost, seed: u64, tick: u64) -> Chain {
+    pub(super) fn chain(&self, rung: usize, state: &[f32], kappa: Cost, [seed, tick]: [u64; 2], first: u32) -> Chain {
         let state = (vector(state) - &self.state_mean).component_mul(&self.state_factor);
         let embedding = self.kappa_embedding(kappa);
-        let draws = |stream| vector(&draws(self.action_low.len(), seed, stream, tick));
+        let draws = |stream: u32| vector(&draws(self.action_low.len(), seed, first + stream, tick));
         let start = draws(0);
         let mut action = start.clone();
         let mut steps = Vec::new();
@@ -127,13 +127,13 @@ impl FloatReference {
 }
 
 impl Layer {
-    fn apply(&self, input: &DVector<f64>) -> DVector<f64> {
+    pub(super) fn apply(&self, input: &DVector<f64>) -> DVector<f64> {
         &self.weights * input + &self.bias
     }
 }
 
 /// `x tanh(ln(1 + e^x))`.
-fn mish(x: f64) -> f64 {
+pub(super) fn mish(x: f64) -> f64 {
     x * x.exp().ln_1p().tanh()
 }
 
@@ -142,7 +142,7 @@ fn matrix(outputs: usize, weights: &[f32]) -> DMatrix<f64> {
     DMatrix::from_iterator(outputs, weights.len() / outputs, weights.iter().copied().map(f64::from))
 }
 
-fn layer(dense: &Dense<'_>) -> Layer {
+pub(super) fn layer(dense: &Dense<'_>) -> Layer {
     Layer { weights: matrix(dense.bias.len(), dense.weights), bias: vector(dense.bias) }
 }
 

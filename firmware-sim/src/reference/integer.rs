@@ -103,14 +103,14 @@ impl IntegerReference {
         }
     }
 
-    pub(super) fn chain(&self, rung: usize, state: &[f32], kappa: Cost, seed: u64, tick: u64) -> Chain {
+    pub(super) fn chain(&self, rung: usize, state: &[f32], kappa: Cost, [seed, tick]: [u64; 2], first: u32) -> Chain {
         let normaliser = self.state_mean.iter().zip(&self.state_factor);
         let state: Vec<f32> = state.iter().zip(normaliser).map(|(s, (mean, factor))| (s - mean) * factor).collect();
         let embedding = self.kappa_embedding(kappa);
         let context = &self.context_bias
             + hoisted(&self.context_state, &state, self.state_unit)
             + hoisted(&self.context_kappa, &embedding, self.kappa_unit);
-        let draws = |stream| draws(self.action_low.len(), seed, stream, tick);
+        let draws = |stream: u32| draws(self.action_low.len(), seed, first + stream, tick);
         let start = draws(0);
         let mut action = start.clone();
         let mut steps = Vec::new();

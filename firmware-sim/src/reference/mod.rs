@@ -6,14 +6,17 @@
 //! `docs/numerics.md` says so; it agrees in every bit. Only the noise is
 //! shared, for it is addressed and not computed.
 
+mod critic;
 mod float;
 mod integer;
 
 use armor_core::image::{Network, PolicyImage};
 use armor_core::noise::Noise;
 use armor_core::units::Cost;
+use armor_infer::STREAMS;
 use serde::Serialize;
 
+pub use critic::{CriticReference, Estimate};
 use float::FloatReference;
 use integer::IntegerReference;
 
@@ -79,10 +82,34 @@ impl Reference {
     /// # Panics
     /// Where the image has no such rung, or the state not its length.
     pub fn chain(&self, rung: usize, state: &[f32], kappa: Cost, seed: u64, tick: u64) -> Chain {
+        self.candidate(0, rung, state, kappa, [seed, tick])
+    }
+
+    /// As [`Reference::chain`], of one of the candidates that the best is chosen of.
+    fn candidate(&self, index: u32, rung: usize, state: &[f32], kappa: Cost, place: [u64; 2]) -> Chain {
+        let first = index * STREAMS;
         match self {
-            Self::Float(reference) => reference.chain(rung, state, kappa, seed, tick),
-            Self::Integer(reference) => reference.chain(rung, state, kappa, seed, tick),
+            Self::Float(reference) => reference.chain(rung, state, kappa, place, first),
+            Self::Integer(reference) => reference.chain(rung, state, kappa, place, first),
         }
+    }
+
+    /// The actions that a controller of the best of `count` chooses from, and
+    /// what `critic` says of each; otherwise as [`Reference::chain`].
+    pub fn candidates(
+        &self,
+        (critic, count): (&CriticReference, u32),
+        rung: usize,
+        state: &[f32],
+        kappa: Cost,
+        place: [u64; 2],
+    ) -> Vec<(Vec<f64>, Estimate)> {
+        let candidate = |index| {
+            let Chain { state_normalized, action, .. } = self.candidate(index, rung, state, kappa, place);
+            let estimate = critic.estimate(&state_normalized, kappa.to_f32().into(), &action);
+            (action, estimate)
+        };
+        (0..count).map(candidate).collect()
     }
 }
 

@@ -49,7 +49,7 @@ fn it_agrees_with_the_controller_on_a_budget_map() {
         (0..7)
             .map(|tick| {
                 let step = controller.step(&STATE, f32::from(tick > 0));
-                let chain = reference.chain(step.rung.unwrap(), &STATE, step.kappa, SEED, tick);
+                let chain = reference.chain(step.rung.unwrap(), &STATE, step.kappa, [SEED, tick], 0);
                 for (entry, expected) in step.action.iter().zip(chain.action) {
                     assert!((f64::from(*entry) - expected).abs() < 2e-5, "{entry} is not {expected}");
                 }
@@ -108,4 +108,38 @@ fn each_row_follows_from_the_one_before_by_eq_12() {
         before.clone_from(&row.action);
     }
     assert_eq!(before, chain.action);
+}
+
+/// What is flown is a candidate that the reference's own critic lets win, and
+/// the budget matters: with it the choice changes.
+#[test]
+fn it_agrees_with_the_choice_among_candidates() {
+    const COUNT: usize = 8;
+    let mut differ = 0;
+    for seed in 0..20 {
+        with_image(&Parts::random("ball-run", BALL_RUN, seed).with_critic(seed), |image| {
+            let reference = Reference::new(image);
+            let critic = CriticReference::new(image.critic().unwrap());
+            let chosen = [0.0, 30.0].map(|budget| {
+                let limit = CostLimit::new(budget).unwrap();
+                let mut pilot = crate::host::pilot(image, limit, SEED, COUNT as u8).unwrap();
+                let step = pilot.step_within(&STATE, 0.0, usize::MAX);
+                let asked = (&critic, COUNT as u32);
+                let candidates = reference.candidates(asked, step.rung.unwrap(), &STATE, step.kappa, [SEED, 0]);
+                let estimates: Vec<Estimate> = candidates.iter().map(|(_, estimate)| *estimate).collect();
+                let taken = candidates.iter().position(|(action, _)| {
+                    step.action.iter().zip(action).all(|(taken, entry)| (f64::from(*taken) - entry).abs() < 2e-5)
+                });
+                let taken = taken.expect("the action is none of the candidates");
+                assert!(estimates[taken].may_win(&estimates, 1e-5), "seed {seed}: {taken} of {estimates:?}");
+                // Where the tolerance could hide a wrong choice, this would not be a test.
+                let winners = estimates.iter().filter(|estimate| estimate.may_win(&estimates, 1e-5));
+                // Candidates on the same bounds are one.
+                assert!(winners.into_iter().all(|one| *one == estimates[taken]), "seed {seed}: {estimates:?}");
+                taken
+            });
+            differ += usize::from(chosen[0] != chosen[1]);
+        });
+    }
+    assert!(differ > 0);
 }

@@ -15,7 +15,7 @@ use armor_infer::Policy;
 use serde::Serialize;
 
 use crate::host::{self, HostController};
-use crate::reference::Reference;
+use crate::reference::{CriticReference, Estimate, Reference};
 
 /// What the checks of an image found.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -56,6 +56,11 @@ pub fn verify(bytes: &[u8], seed: u64) -> Verification {
             result.push("image", Ok(format!("{} bytes, format and checksums are right", result.image_bytes)));
             result.golden(&image);
             result.agreement(&image);
+            if let Some(critic) = image.critic() {
+                let choices = choices(&image, &CriticReference::new(critic));
+                let of = |rows| format!("{rows} choices of {CHOICES} are the f64 reference's, to rounding");
+                result.push("best of candidates", choices.map(of));
+            }
             for (name, outcome) in corruption::run(&image, seed) {
                 result.push(name, outcome);
             }
@@ -123,6 +128,37 @@ fn largest_difference(image: &PolicyImage<'_>, reference: &Reference) -> Result<
     // By total order a NaN is the largest, and not lost.
     let largest = differences.into_iter().max_by(f64::total_cmp);
     largest.ok_or_else(|| "the image has no golden states to compare on".into())
+}
+
+/// Candidates of the check of choices.
+const CHOICES: usize = 4;
+/// How far the critic's estimates are known, as a share of their size.
+const CHOICE_TOLERANCE: f64 = 1e-4;
+
+/// Flies the golden trace's states and costs as the best of [`CHOICES`] and
+/// asks the reference whether each action is a candidate that may win;
+/// returns how many were.
+fn choices(image: &PolicyImage<'_>, critic: &CriticReference) -> Result<usize, String> {
+    let (golden, reference) = (&image.sections().golden, Reference::new(image));
+    let limit = CostLimit::from_cost(golden.limit);
+    let mut controller = host::pilot(image, limit, golden.seed, CHOICES as u8).map_err(|error| error.to_string())?;
+    for (tick, row) in (0..).zip(golden.rows()) {
+        let step = controller.step_within(row.state, row.incurred, usize::MAX);
+        let Some(rung) = step.rung else { return Err(format!("golden state {tick}: no action")) };
+        let asked = (critic, CHOICES as u32);
+        let candidates = reference.candidates(asked, rung, row.state, step.kappa, [golden.seed, tick]);
+        let estimates: Vec<Estimate> = candidates.iter().map(|(_, estimate)| *estimate).collect();
+        let size = estimates.iter().fold(1.0f64, |size, one| size.max(one.reward.abs()).max(one.excess.abs()));
+        let is_taken = |action: &[f64]| {
+            let entries = step.action.iter().zip(action);
+            entries.into_iter().all(|(taken, entry)| (f64::from(*taken) - entry).abs() <= reference.tolerance())
+        };
+        let may_win = |estimate: &Estimate| estimate.may_win(&estimates, CHOICE_TOLERANCE * size);
+        if !candidates.iter().any(|(action, estimate)| is_taken(action) && may_win(estimate)) {
+            return Err(format!("golden state {tick}: the action is not the best candidate"));
+        }
+    }
+    Ok(golden.rows().len())
 }
 
 impl fmt::Display for Verification {

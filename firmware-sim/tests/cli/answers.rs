@@ -12,8 +12,8 @@ fn an_image_is_inspected() {
     assert_eq!(report["rungs"][1]["sampler"], "DDIM");
     // Shape::macs_once() + 5 * macs_per_step() of the fixture, by hand.
     assert_eq!(report["rungs"][0]["macs_per_action"], (4 + 16 + 12 + 10 * 16) + 5 * (32 + 512 + 32));
-    // All but the optional budget map.
-    assert_eq!(report["sections"].as_array().unwrap().len(), SectionKind::ALL.len() - 1);
+    // All but the optional budget map and critic.
+    assert_eq!(report["sections"].as_array().unwrap().len(), SectionKind::ALL.len() - 2);
     fits_a_terminal(&bench.run(&["inspect", "policy.armor"]));
 }
 
@@ -220,4 +220,18 @@ fn a_chip_is_written_with_the_permissions_of_any_new_file() {
     let bench = Bench::flashed();
     let permissions = |path: &Path| fs::metadata(path).unwrap().permissions();
     assert_eq!(permissions(&bench.path("robot.chip")), permissions(&bench.path("policy.armor")));
+}
+
+#[test]
+fn the_best_of_several_actions_flies_by_the_images_critic() {
+    let bench = Bench::new();
+    bench.put("policy.armor", &Parts::random("ball-run", BALL_RUN, 1).with_golden().with_critic(1).bytes());
+    bench.json(&["flash", "policy.armor", "--chip", "robot.chip"]);
+    let flown = |options: &[&str]| bench.json(&[&RUN[..], options].concat())["reward"].as_f64().unwrap();
+    let plain = flown(&[]);
+    assert_eq!(flown(&["--best-of", "1"]), plain);
+    assert_ne!(flown(&["--best-of", "4"]), plain);
+    let checks = bench.json(&["verify", "policy.armor"]);
+    assert_eq!(checks["passed"], true, "{checks}");
+    assert!(checks["checks"].as_array().unwrap().iter().any(|check| check["name"] == "best of candidates"));
 }

@@ -19,6 +19,7 @@ fn wrong_arguments_are_bad_usage() {
         assert!(bench.misuse(&[&RUN[..], &[&format!("{option}={value}")]].concat()).contains(option));
     }
     bench.misuse(&["run", "--chip", "robot.chip", "--task", "ball-run", "--episodes", "0"]);
+    assert!(bench.misuse(&[&RUN[..], &["--best-of", "3"]].concat()).contains("1, 2, 4, 8 or 16"));
     bench.misuse(&["serve", "policy.armor"]);
     bench.misuse(&["serve", "policy.armor", "--stdio", "--listen", "127.0.0.1:0"]);
 }
@@ -61,6 +62,7 @@ fn a_flight_that_does_not_fit_is_refused() {
     assert!(with(&["--rate", "7"]).contains("30 Hz or a whole fraction, not at 7"));
     assert!(with(&["--transport-us", "20000"]).contains("do not fit a period of 33333 us; fly at a lower rate"));
     assert!(with(&["--limit", &(TRAINED_MAX + 1.0).to_string()]).contains("set a limit of at most 40"));
+    assert!(with(&["--best-of", "4"]).contains("no critic to choose among candidates by"));
     // None of these was a flight, so the policy is still on trial.
     assert!(text(&bench.run(&RUN).stderr).contains("slot A flew its trial and is confirmed"));
     let simulator = ["run", "--chip", "robot.chip", "--task", "SafetyPointGoal1-v0"];

@@ -15,7 +15,7 @@ use armor_core::image::{PolicyImage, SectionKind};
 use armor_core::units::{Cost, CostLimit};
 use armor_infer::journal::{Journal, Reserve};
 use armor_infer::link::{Answer, Endpoint, Receiver, Request, answer_bytes, decode, encode, frame_bytes, request_bytes};
-use armor_infer::{Controller, Kernel, Policy, golden};
+use armor_infer::{BestOf, Controller, Kernel, Policy, golden};
 use flash::Flash;
 
 const STATE: usize = 60;
@@ -33,6 +33,7 @@ pub extern "C" fn entry() -> ! {
         black_box((image.bytes(), image.manifest(), image.sections()));
         black_box(image.words(black_box(SectionKind::Golden)));
         fly(&image);
+        choose(&image);
         serve(&image);
         let _ = black_box(golden::replay::<STATE, ACTION, HIDDEN>(&image));
     }
@@ -51,6 +52,17 @@ fn fly(image: &PolicyImage<'static>) {
     }
     let Ok(limit) = CostLimit::new(black_box(20.0)) else { return };
     let Ok(controller) = Controller::<STATE, ACTION, HIDDEN>::new(policy, limit, black_box(1)) else { return };
+    let mut controller = black_box(controller);
+    let state: &[f32] = black_box(&[0.0; STATE]);
+    black_box(controller.step(state, black_box(0.0)));
+    black_box(controller.step_within(state, black_box(0.0), black_box(5)));
+    black_box((controller.new_episode(limit, black_box(2)).is_ok(), controller.kappa()));
+}
+
+fn choose(image: &PolicyImage<'static>) {
+    black_box(image.critic());
+    let Ok(limit) = CostLimit::new(black_box(20.0)) else { return };
+    let Ok(controller) = BestOf::<STATE, ACTION, HIDDEN, 4>::new(image, limit, black_box(1)) else { return };
     let mut controller = black_box(controller);
     let state: &[f32] = black_box(&[0.0; STATE]);
     black_box(controller.step(state, black_box(0.0)));
