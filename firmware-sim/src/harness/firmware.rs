@@ -30,6 +30,9 @@ use crate::host::{self, ACTION, Pilot};
 const HOLDS: u32 = 3;
 /// Answers after which the weights in RAM are checked.
 const SCRUB: u64 = 50;
+/// Samples without a cost report after which a control step is charged for
+/// two, for the clock that counts them may be slow.
+const SILENCE: u32 = 4;
 /// Time without power after a brown-out.
 pub(super) const POWER_OFF: Duration = Duration::from_millis(20);
 
@@ -73,6 +76,8 @@ pub(super) struct Firmware<'s> {
     meter: CostMeter,
     /// Plant steps that should have ended by the controller's own clock.
     due: u32,
+    /// Samples since the last cost report.
+    silent: u32,
     deadline: Deadline,
     /// When the sample was taken, what it says, and how many steps were due.
     sample: Option<(Duration, Option<Vec<f32>>, u32)>,
@@ -121,6 +126,7 @@ impl<'s> Firmware<'s> {
             kappa,
             meter,
             due: 0,
+            silent: 0,
             deadline: Deadline::new(rungs, setup.answer_time(plan)),
             sample: None,
             answer: None,
@@ -224,10 +230,15 @@ impl<'s> Firmware<'s> {
     ) {
         let now = agenda.now();
         let Some((sampled, state, due)) = self.sample.take() else { return };
-        let was_lost = self.meter.next().is_none();
-        let settled = self.meter.settle(&robot.take_reports(now), due);
-        if was_lost && let Some(next) = self.meter.next() {
-            self.due = next + self.hold;
+        let reports = robot.take_reports(now);
+        self.silent = if reports.is_empty() { self.silent + 1 } else { 0 };
+        let settled = self.meter.settle(&reports, due);
+        if let Some(next) = self.meter.next() {
+            // The monitor knows the time: a clock that is slow must not forget what it says.
+            self.due = self.due.max(next + self.hold);
+        }
+        if self.silent > SILENCE {
+            self.due += self.hold;
         }
         if settled.missing > 0 {
             robot.note(Notice::MissingCost);

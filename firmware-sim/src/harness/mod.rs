@@ -182,13 +182,14 @@ impl Setup {
     }
 
     /// Plant steps whose costs the controller may never hear of around a reset:
-    /// until the watchdog or the power has struck, while it boots, a control
-    /// step on either side, and those of a clock that runs slow or stalls.
+    /// those of an answer that just satisfies the watchdog, until it strikes
+    /// then, without power, and while it boots; a control step on either side,
+    /// and two that a slow clock may be behind.
     fn blind_steps(&self, plan: &FlightPlan) -> u32 {
         let period = self.period(plan);
         let hold = plan.task.rate_hz / plan.rate_hz;
-        let blind = self.watchdog + firmware::POWER_OFF + self.boot + 2 * self.transport;
-        (blind.as_secs_f64() / period.as_secs_f64()).ceil() as u32 * hold + 3 * hold
+        let blind = 2 * self.watchdog + firmware::POWER_OFF + self.boot + 2 * self.transport;
+        (blind.as_secs_f64() / period.as_secs_f64()).ceil() as u32 * hold + 4 * hold
     }
 }
 

@@ -108,6 +108,18 @@ fn no_mixture_of_faults_breaks_the_budget_or_the_bounds() {
     }
 }
 
+/// A slow clock that hears no reports for a while, and is reset then, must not
+/// have forgotten the steps of that while.
+#[test]
+fn a_slow_clock_without_reports_forgets_no_cost_across_a_reset() {
+    let faults = ["clock-slow=0.2", "link-loss=0.05", "watchdog-reset=0.02", "overlong=0.2"];
+    for seed in 0..30 {
+        let plan = FlightPlan { seed, episodes: 1, ..plan("point-circle", 39.0) };
+        let (_, tally) = flown(&plan, board(5_000_000), &faults);
+        assert_eq!((tally.budget_errors, tally.actions_out_of_range), (0, 0), "seed {seed}: {tally:?}");
+    }
+}
+
 /// After each reset the budget is what the journal kept: less than before, and
 /// not nothing while the limit allows a reset.
 #[test]

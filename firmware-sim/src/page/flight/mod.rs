@@ -39,7 +39,8 @@ pub fn page(told: &Told<'_>) -> String {
     let costs: Vec<f64> = episodes.iter().map(cost).collect();
     let worst = (0..costs.len()).rev().max_by(|&a, &b| costs[a].total_cmp(&costs[b]));
     if let Some((number, episode)) = worst.and_then(|number| Some((number, episodes.get(number)?))) {
-        let _ = writeln!(out, "<h2>Episode {number}, of {} the one that cost most</h2>", episodes.len());
+        let of = if episodes.len() > 1 { ", the one that cost most" } else { "" };
+        let _ = writeln!(out, "<h2>Episode {number}{of}</h2>");
         path::figure(episodes, number, &mut out);
         let curves = Curves::new(episode);
         out.push_str("<div class=\"grid\">\n");
@@ -70,9 +71,9 @@ fn header(told: &Told<'_>, out: &mut String) {
     let faults = if faults.is_empty() { "no fault injected".to_owned() } else { faults.join(", ") };
     let _ = write!(
         out,
-        "<h1>{}</h1>\n<p class=\"soft\">{} episodes at {} Hz on {board}; cost limit {}, seed {}; {:?}, {} bytes; {}</p>\n",
+        "<h1>{}</h1>\n<p class=\"soft\">{} at {} Hz on {board}; cost limit {}, seed {}; {:?}, {} bytes; {}</p>\n",
         escape(summary.task),
-        summary.episodes,
+        if summary.episodes == 1 { "1 episode".to_owned() } else { format!("{} episodes", summary.episodes) },
         plan.rate_hz,
         summary.cost_limit,
         summary.seed,

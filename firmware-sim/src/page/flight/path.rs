@@ -24,16 +24,16 @@ const FAINT_POINTS: usize = 150;
 pub(super) fn figure(episodes: &[RobotEpisode], number: usize, out: &mut String) {
     let Some(episode) = episodes.get(number) else { return };
     out.push_str("<figure class=\"wide\">\n<h3>Path</h3>\n");
-    legend(episode, out);
+    legend(episode, episodes.len() > 1, out);
     svg(episodes, number, out);
     out.push_str("</figure>\n");
 }
 
-fn legend(episode: &RobotEpisode, out: &mut String) {
+fn legend(episode: &RobotEpisode, has_others: bool, out: &mut String) {
     let has = |kind: fn(&Thing) -> bool| episode.scene.things.iter().any(kind);
     let entries = [
         (true, "line c0", "M0 5H18", "path"),
-        (true, "other", "M0 5H18", "other episodes"),
+        (has_others, "other", "M0 5H18", "other episodes"),
         (true, "costly", "M0 5H18", "where it cost"),
         (true, "struck", "M6 2l6 6m0 -6l-6 6", "a fault struck"),
         (has(|thing| matches!(thing, Thing::WallX(_) | Thing::WallY(_))), "danger", "M0 0H18V10H0Z", "beyond a limit"),
