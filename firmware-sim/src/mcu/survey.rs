@@ -73,7 +73,7 @@ pub struct Survey {
     pub firmware_bytes: u64,
     /// Bytes of RAM that hold variables.
     pub static_ram_bytes: u64,
-    /// The stack's high-water mark.
+    /// The stack's high-water mark over golden trace and episode.
     pub stack_bytes: u32,
 }
 
@@ -94,7 +94,7 @@ pub fn survey(
     let flashed = Flashed::new(machine, firmware, image.bytes())?;
 
     let golden = flashed.run("golden", plan.patience)?;
-    let mut stack = [golden.number("stack_bytes"), None, None];
+    let mut stack = [golden.number("stack_bytes"), None];
     let task = native(manifest.task);
     let mut episode = None;
     if let Some(task) = task {
@@ -117,8 +117,7 @@ pub fn survey(
     }
 
     let macs = manifest.shape.macs_once() + u64::from(steps) * manifest.shape.macs_per_step();
-    let Instructions { total, classes, functions, stack_bytes, .. } = instructions;
-    stack[2] = Some(stack_bytes);
+    let Instructions { total, classes, functions, .. } = instructions;
     Ok(Survey {
         machine: machine.name,
         core: machine.core,
