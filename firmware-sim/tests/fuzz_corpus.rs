@@ -1,5 +1,8 @@
 //! The fuzzer's corpus (`armor-infer/fuzz`), through the same functions without the fuzzer.
 
+// What is public in the fuzzer's crate is private here.
+#![allow(unreachable_pub)]
+
 #[path = "../../armor-infer/fuzz/src/controller.rs"]
 mod controller;
 #[allow(dead_code)]
