@@ -21,6 +21,7 @@ use super::deadline::Deadline;
 use super::record::{Decision, Notice};
 use super::robot::{Action, Robot};
 use super::{Setup, rung_times};
+use crate::board::model::Modelled;
 use crate::fault::FaultKind;
 use crate::flash::NorModel;
 use crate::flight::{FlightError, FlightPlan};
@@ -79,6 +80,8 @@ pub(super) struct Firmware<'s> {
     /// Samples since the last cost report.
     silent: u32,
     deadline: Deadline,
+    /// What an action of each rung takes; nothing on this host.
+    actions: Vec<Option<Modelled>>,
     /// When the sample was taken, what it says, and how many steps were due.
     sample: Option<(Duration, Option<Vec<f32>>, u32)>,
     /// What is being computed: when it was sampled, its steps, the action and why.
@@ -127,6 +130,7 @@ impl<'s> Firmware<'s> {
             meter,
             due: 0,
             silent: 0,
+            actions: (0..image.manifest().rungs.len()).map(|rung| setup.board?.action(image, rung)).collect(),
             deadline: Deadline::new(rungs, setup.answer_time(plan)),
             sample: None,
             answer: None,
@@ -181,7 +185,7 @@ impl<'s> Firmware<'s> {
                     }
                     self.sample(image.sections(), robot, agenda);
                 }
-                Event::Receive => self.receive(image, controller.as_mut(), robot, agenda),
+                Event::Receive => self.receive(controller.as_mut(), robot, agenda),
                 Event::Answer => {
                     if let Some(end) = self.release(image.sections(), robot, agenda, journal) {
                         return Ok(end);
@@ -221,13 +225,7 @@ impl<'s> Firmware<'s> {
     }
 
     /// Sample and reports are there: the controller steps.
-    fn receive(
-        &mut self,
-        image: &PolicyImage<'_>,
-        controller: &mut dyn Pilot,
-        robot: &mut Robot<'_>,
-        agenda: &mut Agenda<Event>,
-    ) {
+    fn receive(&mut self, controller: &mut dyn Pilot, robot: &mut Robot<'_>, agenda: &mut Agenda<Event>) {
         let now = agenda.now();
         let Some((sampled, state, due)) = self.sample.take() else { return };
         let reports = robot.take_reports(now);
@@ -268,7 +266,7 @@ impl<'s> Firmware<'s> {
             self.is_hung = true;
             return;
         }
-        let latency = self.latency(image, &step).mul_f64(robot.injector.stretch());
+        let latency = self.latency(&step).mul_f64(robot.injector.stretch());
         let record = robot.record();
         (record.rung, record.fault, record.latency) = (step.rung, step.fault, step.rung.map(|_| latency));
         let (action, decision) = self.decide(&step);
@@ -291,9 +289,9 @@ impl<'s> Firmware<'s> {
     }
 
     /// How long a step takes on the board, with the jitter of this answer; no time on the host.
-    fn latency(&mut self, image: &PolicyImage<'_>, step: &Step<ACTION>) -> Duration {
+    fn latency(&mut self, step: &Step<ACTION>) -> Duration {
         self.answers += 1;
-        let modelled = step.rung.and_then(|rung| self.setup.board?.action(image, rung));
+        let modelled = step.rung.and_then(|rung| self.actions.get(rung).copied().flatten());
         let share = f64::from(uniform(self.jitter.words(0, self.answers, 0)[0]));
         modelled.map_or(Duration::ZERO, |action| action.time + (action.worst - action.time).mul_f64(share))
     }
