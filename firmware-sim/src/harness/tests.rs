@@ -125,7 +125,7 @@ fn a_slow_clock_without_reports_forgets_no_cost_across_a_reset() {
 #[test]
 fn a_reset_in_mid_episode_restores_the_budget_from_flash() {
     for fault in ["watchdog-reset=0.004", "brown-out=0.004"] {
-        let plan = FlightPlan { episodes: 6, ..plan("ball-run", 39.0) };
+        let plan = FlightPlan { episodes: 40, ..plan("ball-run", 39.0) };
         let (episodes, tally) = flown(&plan, None, &[fault]);
         assert!(tally.notices(Notice::Reset) > 0, "{fault}");
         let mut kept = 0;
