@@ -14,7 +14,7 @@ macro_rules! files {
 }
 
 /// The files of the package.
-pub(super) const FILES: [(&str, &str); 16] = files![
+pub(super) const FILES: [(&str, &str); 17] = files![
     "__init__.py",
     "__main__.py",
     "cli.py",
@@ -31,6 +31,7 @@ pub(super) const FILES: [(&str, &str); 16] = files![
     "report.py",
     "tasks.json",
     "tasks.py",
+    "wander.py",
 ];
 
 /// Writes the package to a folder that Python can import it from.
