@@ -9,7 +9,7 @@
 //!
 //! The shares are solved from the instructions that emulated cores executed for
 //! actions of several sizes ([`crate::mcu::record`]), so they are exact at
-//! those sizes. What an instruction costs is in [`super::cost`].
+//! those sizes. What an instruction costs is in `cost.rs`.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
