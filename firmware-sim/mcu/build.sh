@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Builds the bare-metal firmware for the named boards into target/mcu/BOARD.elf;
+# Builds the bare-metal firmware for the named boards into target/mcu/BOARD.elf,
+# and with the check of its kernels, which no flight needs, into BOARD-check.elf;
 # `c` is the firmware in C for mps2-an386, and `all` is all of them. Needs Debian's rustc-web and rust-web-src, whose library
 # source builds `core` for any target, and a linker: rustup's rust-lld or lld.
 #
@@ -72,6 +73,9 @@ rust_firmware() {
     package armor-mcu --features "$feature"
     cp "$OUT/$target/release/armor-mcu" "$OUT/$1.elf.part"
     mv "$OUT/$1.elf.part" "$OUT/$1.elf"
+    package armor-mcu --features "$feature,check"
+    cp "$OUT/$target/release/armor-mcu" "$OUT/$1-check.elf.part"
+    mv "$OUT/$1-check.elf.part" "$OUT/$1-check.elf"
 }
 
 c_firmware() {

@@ -8,7 +8,7 @@
 //! |---|---|---|
 //! | `golden` | replays the image's golden trace | `golden_rows` |
 //! | `bench STEPS ACTIONS` | actions by chains of at most STEPS, in the golden trace's states | `checksum` of their bits |
-//! | `kernels ROUNDS` | compares the machine's kernels with the portable ones (`Kernel::check`) | `kernels` and the rounds |
+//! | `kernels ROUNDS` | compares the machine's kernels with the portable ones (`Kernel::check`); with the feature `check` only | `kernels` and the rounds |
 //! | `serve STEPS ACTIONS` | answers the link (`docs/link.md`) until it gave ACTIONS, or for ever for 0 | `actions` |
 //!
 //! At the end: `stack_bytes`, the stack's high-water mark, or `failed` and why.
@@ -31,7 +31,6 @@ use core::ffi::CStr;
 use core::mem::MaybeUninit;
 
 use armor_core::image::PolicyImage;
-use armor_infer::Kernel;
 use armor_infer::link::Endpoint;
 use semihosting::process::exit;
 
@@ -79,9 +78,10 @@ fn run() -> Result<(), Stop> {
             let (steps, actions) = (argument()?, argument()?);
             bench::run(endpoint(image, steps as usize)?, image, actions)
         }
+        #[cfg(feature = "check")]
         Some(b"kernels") => {
             let rounds = argument()?;
-            Kernel::best().check(1, rounds).map_err(|_| c"failed kernels")?;
+            armor_infer::Kernel::best().check(1, rounds).map_err(|_| c"failed kernels")?;
             tell(c"kernels", rounds);
             Ok(())
         }

@@ -28,7 +28,7 @@ pub(super) struct Budgets {
     /// The emulated board, or `all` of them.
     #[arg(long, value_name = "M", value_parser = machines, default_value = "all")]
     machine: Machines,
-    /// A folder with built firmware, MACHINE.elf, in place of building it.
+    /// A folder with built firmware, MACHINE-check.elf, in place of building it.
     #[arg(long, value_name = "DIR")]
     firmware: Option<PathBuf>,
     /// Record what was counted, in firmware-sim/mcu/instructions.csv, in place
@@ -64,8 +64,8 @@ impl Budgets {
         for machine in self.machine.0 {
             output.note(format_args!("{}: firmware", machine.name));
             let firmware = match &self.firmware {
-                None => Firmware::build(machine)?,
-                Some(folder) => Firmware::read(&folder.join(format!("{}.elf", machine.name)))?,
+                None => Firmware::build_with_check(machine)?,
+                Some(folder) => Firmware::read(&folder.join(format!("{}-check.elf", machine.name)))?,
             };
             output.note(format_args!("{}: counting", machine.name));
             counted.extend(measure(machine, &firmware, &sizes, Duration::from_secs(self.patience))?);

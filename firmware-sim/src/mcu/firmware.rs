@@ -43,6 +43,18 @@ impl Firmware {
     /// # Errors
     /// [`McuError`]
     pub fn build(machine: &Machine) -> Result<Self, McuError> {
+        Self::build_named(machine, "")
+    }
+
+    /// As [`Self::build`], with the check of its kernels, which no flight needs.
+    ///
+    /// # Errors
+    /// [`McuError`]
+    pub fn build_with_check(machine: &Machine) -> Result<Self, McuError> {
+        Self::build_named(machine, "-check")
+    }
+
+    fn build_named(machine: &Machine, suffix: &str) -> Result<Self, McuError> {
         let script = Path::new(SOURCE).join("build.sh");
         let output = Command::new(&script).arg(machine.name).stdin(Stdio::null()).output();
         let output = output.map_err(McuError::system("run", &script))?;
@@ -51,7 +63,7 @@ impl Firmware {
             let last = said.lines().rfind(|line| line.contains("error")).or(said.lines().last()).unwrap_or_default();
             return Err(McuError::Build { said: last.trim_start_matches("error: ").into() });
         }
-        Self::read(&Path::new(BUILT).join(format!("{}.elf", machine.name)))
+        Self::read(&Path::new(BUILT).join(format!("{}{suffix}.elf", machine.name)))
     }
 
     /// Reads a built firmware.
