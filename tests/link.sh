@@ -19,7 +19,8 @@ if ! python3 -c 'import ensurepip, venv' 2>/dev/null; then
     } >&2
 fi
 
-cargo test --locked -p firmware-sim --test simulators -- --ignored
+# What needs an emulator, too, is for tests/mcu.sh.
+cargo test --locked -p firmware-sim --test simulators -- --ignored --skip emulated
 
 python=$ARMOR_SIMULATORS/bin/python
 if [[ ! -d $TOOLS ]]; then

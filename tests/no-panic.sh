@@ -2,11 +2,11 @@
 # Proves that armor-core and armor-infer contain no panic: a firmware that calls
 # all of them (tests/no-panic) is linked in release for a Cortex-M4, with both
 # number formats and with each alone, and must be without the panic handler, for
-# nothing then can call it. That nothing allocates follows from bare-metal.sh,
-# and is looked for again. A firmware with a panic in it shows that one is found.
+# nothing then can call it. That nothing allocates follows from mcu.sh, which
+# builds with `core` alone, and is looked for again. A firmware with a panic in it shows that one is found.
 #
-# Needs what bare-metal.sh needs, and the linker for Arm; installs them if they
-# are missing (Debian, as root). Prints one line a firmware.
+# Needs a compiler that has its library's source beside it, Debian's rustc-web,
+# and the linker for Arm; installs them if they are missing (as root). Prints one line a firmware.
 set -euo pipefail
 shopt -s inherit_errexit
 cd "$(dirname "$0")/no-panic"

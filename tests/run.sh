@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Runs every test of the workspace: units, documentation, integration, the
-# command lines, the simulators over the link, and the bare-metal builds.
+# command lines, the simulators over the link, and emulated microcontrollers.
 # Installs a compiler if there is none (Debian, as root). Prints one line for
 # each part, and ends at the first that fails.
 set -euo pipefail
@@ -30,5 +30,5 @@ part "power cuts" cargo test -q -p firmware-sim --lib --locked -- --nocapture _o
 part "embedding" tests/embedding.sh
 part "interchange" tests/interchange.sh
 part "link" tests/link.sh
-part "bare metal" tests/bare-metal.sh
+part "microcontrollers" tests/mcu.sh
 part "no panic" tests/no-panic.sh

@@ -55,8 +55,12 @@ pub const fn frame_bytes(message: usize) -> usize {
 
 /// Writes a message as a frame to the front of `buffer`; returns the frame.
 ///
+/// Not inlined, as [`decode`]: its part of a small stack is not there while a
+/// message is answered.
+///
 /// # Errors
 /// [`FrameError::Full`]
+#[inline(never)]
 pub fn encode<'b>(message: &impl Serialize, buffer: &'b mut [u8]) -> Result<&'b [u8], FrameError> {
     let frame = Checked { frame: Stuffed::new(buffer), digest: CRC.digest() };
     postcard::serialize_with_flavor(message, frame).map(|frame| &*frame).map_err(|_| FrameError::Full)

@@ -5,8 +5,11 @@ use std::net::TcpListener;
 use std::path::PathBuf;
 use std::time::Duration;
 
+use clap::CommandFactory;
+use clap::error::ErrorKind;
 use serde::Serialize;
 
+use super::Cli;
 use super::output::{CommandResult, Output};
 use crate::host;
 use crate::image_file::ImageFile;
@@ -65,14 +68,15 @@ struct Report {
 
 impl Mcu {
     pub(super) fn run(self, output: Output) -> CommandResult {
+        if self.listen.is_some() && self.machine.0.len() != 1 {
+            let message = "--listen puts one machine behind the link; name it";
+            Cli::command().error(ErrorKind::ArgumentConflict, message).exit();
+        }
         let file = ImageFile::read(&self.image)?;
         file.image()?;
         let (max_steps, actions, seed) = (self.max_steps, self.actions, self.seed);
         let patience = Duration::from_secs(self.patience);
         let plan = SurveyPlan { max_steps, actions, seed, patience };
-        if self.listen.is_some() && self.machine.0.len() != 1 {
-            return Err("--listen puts one machine behind the link; name it".into());
-        }
         let mut report = Report { image: self.image.clone(), machines: Vec::new() };
         for &machine in &self.machine.0 {
             output.note(format_args!("{}: firmware", machine.name));

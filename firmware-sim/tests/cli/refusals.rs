@@ -117,6 +117,6 @@ fn a_microcontroller_needs_a_machine_that_there_is_and_firmware_for_it() {
     bench.put("mps2-an386.elf", b"no firmware");
     let error = bench.failure(&fly);
     assert!(error.contains("no firmware of firmware-sim/mcu") && error.contains("build.sh"), "{error}");
-    let error = bench.failure(&["mcu", "policy.armor", "--machine", "all", "--listen", "127.0.0.1:0"]);
-    assert!(error.contains("name it"), "{error}");
+    let usage = bench.misuse(&["mcu", "policy.armor", "--machine", "all", "--listen", "127.0.0.1:0"]);
+    assert!(usage.contains("name it"), "{usage}");
 }

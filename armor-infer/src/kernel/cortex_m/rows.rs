@@ -3,8 +3,6 @@
 
 use core::arch::naked_asm;
 
-use armor_core::fixed::MAX_TERMS;
-
 use crate::kernel::integer;
 
 /// Products of an instruction.
@@ -14,22 +12,17 @@ const ROWS: usize = 4;
 
 /// [`Kernel::sum_rows`](crate::Kernel) of [`Layout::Rows`](armor_core::image::Layout) for codes of 7 bits.
 pub(crate) fn sum_rows_short(weights: &[i8], codes: &[i16], sums: &mut [i32]) {
-    let mut bytes = [0; MAX_TERMS];
     let (stride, chunks) = (codes.len(), codes.len() / LANES);
-    let bytes = match bytes.get_mut(..stride) {
-        Some(bytes) if chunks > 0 => bytes,
-        _ => return integer::sum_rows(weights, codes, sums),
-    };
-    for (byte, code) in bytes.iter_mut().zip(codes) {
-        *byte = *code as i8;
+    if chunks == 0 {
+        return integer::sum_rows(weights, codes, sums);
     }
     let (blocks, rest) = sums.as_chunks_mut::<ROWS>();
     let (_, tail) = codes.as_chunks::<LANES>();
     let groups = weights.chunks_exact((ROWS * stride).max(ROWS));
     for (block, group) in blocks.iter_mut().zip(groups) {
-        // SAFETY: `group` is four rows of `stride` weights and `bytes` as long
+        // SAFETY: `group` is four rows of `stride` weights and `codes` as long
         // as one; `chunks` are those of a row, and there is one.
-        unsafe { sum_four(group.as_ptr(), bytes.as_ptr(), block, stride, chunks) };
+        unsafe { sum_four(group.as_ptr(), codes.as_ptr(), block, stride, chunks) };
         for (sum, row) in block.iter_mut().zip(group.chunks_exact(stride.max(1))) {
             let rest = row.get(chunks * LANES..).unwrap_or_default().iter().zip(tail);
             *sum += rest.map(|(weight, code)| i32::from(*weight) * i32::from(*code)).sum::<i32>();
@@ -39,13 +32,14 @@ pub(crate) fn sum_rows_short(weights: &[i8], codes: &[i16], sums: &mut [i32]) {
 }
 
 /// Sums over `chunks` of sixteen codes of four rows, which lie `stride` bytes apart.
+/// VLD20 and VLD21 part the low bytes of codes, which are all of 7 bits, from the high ones.
 ///
 /// # Safety
 /// There are as many weights in each row and as many codes, and at least one chunk.
 #[unsafe(naked)]
 unsafe extern "C" fn sum_four(
     weights: *const i8,
-    codes: *const i8,
+    codes: *const i16,
     sums: &mut [i32; ROWS],
     stride: usize,
     chunks: usize,
@@ -62,15 +56,16 @@ unsafe extern "C" fn sum_four(
         "mov r8, #0",
         "mov r10, #0",
         "dls lr, r12",
-        "2: vldrb.u8 q0, [r1], #16",
-        "vldrb.u8 q1, [r0], #16",
-        "vmladava.s8 r4, q0, q1",
-        "vldrb.u8 q2, [r5], #16",
-        "vmladava.s8 r6, q0, q2",
-        "vldrb.u8 q1, [r7], #16",
-        "vmladava.s8 r8, q0, q1",
-        "vldrb.u8 q2, [r9], #16",
-        "vmladava.s8 r10, q0, q2",
+        "2: vld20.8 {{q0, q1}}, [r1]",
+        "vld21.8 {{q0, q1}}, [r1]!",
+        "vldrb.u8 q2, [r0], #16",
+        "vmladava.s8 r4, q0, q2",
+        "vldrb.u8 q3, [r5], #16",
+        "vmladava.s8 r6, q0, q3",
+        "vldrb.u8 q2, [r7], #16",
+        "vmladava.s8 r8, q0, q2",
+        "vldrb.u8 q3, [r9], #16",
+        "vmladava.s8 r10, q0, q3",
         "le lr, 2b",
         "stm r2, {{r4, r6, r8, r10}}",
         "pop {{r4-r10, pc}}",
