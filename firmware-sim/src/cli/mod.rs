@@ -11,6 +11,7 @@ mod round_trip;
 mod run;
 mod serve;
 mod soak;
+mod subject;
 mod sweep;
 mod trace;
 mod verify;
@@ -25,7 +26,7 @@ use crate::board::{Board, UnknownBoard};
 use crate::host::CANDIDATES;
 use crate::summary::HOST;
 use crate::task::{Task, TaskError};
-use output::Output;
+use output::{CommandResult, Output};
 
 /// Inspect, verify, flash and fly ARMOR policy images.
 #[derive(Debug, Parser)]
@@ -103,6 +104,16 @@ pub fn candidates(text: &str) -> Result<u8, Box<dyn std::error::Error + Send + S
         return Err("the best of 1, 2, 4, 8 or 16 candidates can be taken".into());
     }
     Ok(candidates)
+}
+
+/// A failure where anything was found that no fault may bring about.
+fn unbroken(actions_out_of_range: u64, budget_errors: u64) -> CommandResult {
+    match (actions_out_of_range, budget_errors) {
+        (0, 0) => Ok(()),
+        (range, budget) => {
+            Err(format!("{range} actions out of range and {budget} budget errors; do not fly this, report it").into())
+        }
+    }
 }
 
 /// A sampler as reports write it.

@@ -56,6 +56,10 @@ pub(super) struct Run {
     /// Episodes to fly.
     #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..))]
     episodes: u32,
+    /// Number of the first episode: each starts, and is disturbed, as the seed
+    /// and its number say.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    first: u32,
     /// Decides the starts, the noise and the faults.
     #[arg(long, default_value_t = 0)]
     seed: u64,
@@ -141,7 +145,7 @@ impl Run {
             output.note("--rate or choose a faster --board");
         }
         let mut device = Device::new(chip, &boot);
-        let flight = fly_all(&mut device, &plan, &setup)?;
+        let flight = fly_all(&mut device, &plan, &setup, self.first)?;
         let mut chip = device.into_chip();
         if boot.on_trial {
             chip.confirm()?;

@@ -4,16 +4,12 @@ use std::fmt;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-use armor_core::units::CostLimit;
 use serde::Serialize;
 
-use super::BoardChoice;
 use super::output::{CommandResult, Output};
-use crate::flight::FlightPlan;
-use crate::harness::soak::{SoakPlan, Soaked, soak};
+use super::subject::Subject;
+use crate::harness::soak::{Breach, SoakPlan, Soaked, soak};
 use crate::image_file::ImageFile;
-use crate::summary::HOST;
-use crate::task::Task;
 
 /// Shares at which progress is told.
 const NOTES: u32 = 10;
@@ -24,29 +20,21 @@ const NOTES: u32 = 10;
 /// larger than it may be. Tells how worn the budget's journal would be in a year.
 #[derive(Debug, clap::Args)]
 pub(super) struct Soak {
-    /// The policy image.
-    image: PathBuf,
-    /// The task to fly.
-    #[arg(long, value_parser = super::task)]
-    task: &'static Task,
-    /// What computes the actions: this host, at once, or a board, by its model.
-    #[arg(long, default_value = HOST, value_parser = super::board)]
-    board: BoardChoice,
+    #[command(flatten)]
+    subject: Subject,
     /// Virtual hours to fly.
     #[arg(long, default_value_t = 8.0, value_parser = hours)]
     hours: f64,
-    /// Cost that an episode may incur; the paper's limit for the task, if not given.
-    #[arg(long, value_name = "D", value_parser = super::limit)]
-    limit: Option<CostLimit>,
-    /// Calls of the denoiser that an action may take; no limit, if not given.
-    #[arg(long, value_name = "N", default_value_t = usize::MAX, hide_default_value = true)]
-    max_steps: usize,
     /// Decides starts, noise and faults.
     #[arg(long, default_value_t = 0)]
     seed: u64,
     /// Inject nothing: what a year of quiet flight wears.
     #[arg(long)]
     no_faults: bool,
+    /// Where an error is found, write the chip as it was before that episode to
+    /// this file, so that the episode can be flown alone.
+    #[arg(short, long, value_name = "CHIP")]
+    output: Option<PathBuf>,
 }
 
 #[derive(Serialize)]
@@ -56,6 +44,9 @@ struct Report {
     rate_hz: u32,
     cost_limit: f32,
     seed: u64,
+    #[serde(skip)]
+    max_steps: usize,
+    chip: Option<PathBuf>,
     #[serde(flatten)]
     soaked: Soaked,
     seconds: f64,
@@ -68,42 +59,61 @@ fn hours(text: &str) -> Result<f64, &'static str> {
 
 impl Soak {
     pub(super) fn run(self, output: Output) -> CommandResult {
-        let file = ImageFile::read(&self.image)?;
+        let file = ImageFile::read(&self.subject.image)?;
         let image = file.image()?;
-        let task = self.task;
-        task.plant()?;
-        let limit = self.limit.map_or_else(|| CostLimit::new(task.cost_limit), Ok)?;
-        let (seed, max_steps, rate_hz) = (self.seed, self.max_steps, task.rate_hz);
-        let plan = FlightPlan { task, limit, episodes: 1, seed, rate_hz, max_steps };
-        let plan = SoakPlan {
+        let plan = self.subject.plan(self.seed, 1)?;
+        let soak_plan = SoakPlan {
             image: image.bytes(),
             plan,
-            board: self.board,
+            board: self.subject.board,
             time: Duration::from_secs_f64(3600.0 * self.hours),
             with_faults: !self.no_faults,
         };
         let started = Instant::now();
         let mut told = 0;
-        let soaked = soak(&plan, &mut |share| {
+        let soaked = soak(&soak_plan, &mut |share| {
             let tenths = (share * f64::from(NOTES)) as u32;
             if tenths > told {
                 told = tenths;
                 output.note(format_args!("{:>3} %, {:.0} s", 100 * told / NOTES, started.elapsed().as_secs_f64()));
             }
         })?;
-        let board = self.board.map_or(HOST, |board| board.name);
-        let seconds = started.elapsed().as_secs_f64();
-        let cost_limit = limit.cost().to_f32();
-        let report = Report { task: task.name, board, rate_hz, cost_limit, seed, soaked, seconds };
+        if let (Some(path), Some(chip)) = (&self.output, &soaked.breached) {
+            chip.write(path)?;
+        }
+        let report = Report {
+            task: plan.task.name,
+            board: self.subject.board_name(),
+            rate_hz: plan.rate_hz,
+            cost_limit: plan.limit.cost().to_f32(),
+            seed: self.seed,
+            max_steps: plan.max_steps,
+            chip: self.output,
+            seconds: started.elapsed().as_secs_f64(),
+            soaked,
+        };
         output.report(&report)?;
         let tally = &report.soaked.tally;
-        match (tally.actions_out_of_range, tally.budget_errors) {
-            (0, 0) => Ok(()),
-            (range, budget) => {
-                Err(format!("{range} actions out of range and {budget} budget errors; do not fly this, report it")
-                    .into())
-            }
+        super::unbroken(tally.actions_out_of_range, tally.budget_errors)
+    }
+}
+
+impl Report {
+    /// The command that flies an episode alone, in lines of a shell.
+    fn command(&self, breach: &Breach) -> String {
+        let chip = self.chip.as_ref().map_or_else(|| "CHIP".into(), |path| path.display().to_string());
+        let mut text = format!("firmware-sim run --chip {chip} --task {} --board {}", self.task, self.board);
+        let mut add = |words: &str| text.push_str(&format!(" \\\n    {words}"));
+        if self.max_steps != usize::MAX {
+            add(&format!("--max-steps {}", self.max_steps));
         }
+        let (limit, seed, episode) = (self.cost_limit, self.seed, breach.episode);
+        add(&format!("--limit {limit} --seed {seed} --first {episode} --episodes 1 -o error.html"));
+        for pair in breach.faults.chunks(2) {
+            let words: Vec<_> = pair.iter().map(|fault| format!("--fault {fault}")).collect();
+            add(&words.join(" "));
+        }
+        text
     }
 }
 
@@ -121,6 +131,20 @@ impl fmt::Display for Report {
         let (erases, year) = (soaked.journal_erases, soaked.journal_erases_per_year);
         writeln!(f, "journal             {erases:>10} erases of a block, {year:.0} in a year")?;
         writeln!(f, "{}", soaked.tally)?;
-        write!(f, "took                {:>10.1} s", self.seconds)
+        write!(f, "took                {:>10.1} s", self.seconds)?;
+        for breach in &soaked.breaches {
+            let Breach { episode, budget_errors, actions_out_of_range, .. } = breach;
+            write!(
+                f,
+                "\nepisode {episode}: {budget_errors} budget errors, {actions_out_of_range} actions out of range"
+            )?;
+        }
+        match soaked.breaches.first() {
+            None => Ok(()),
+            Some(first) => {
+                let keep = if self.chip.is_none() { " (soak with -o CHIP to keep its chip)" } else { "" };
+                write!(f, "\n\nThe first of these alone{keep}:\n{}", self.command(first))
+            }
+        }
     }
 }

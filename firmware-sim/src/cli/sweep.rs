@@ -3,18 +3,14 @@
 use std::fmt::{self, Write};
 use std::path::PathBuf;
 
-use armor_core::units::CostLimit;
 use serde::Serialize;
 
-use super::BoardChoice;
 use super::output::{CommandResult, Output};
+use super::subject::Subject;
 use crate::fault::Injection;
 use crate::file;
-use crate::flight::FlightPlan;
 use crate::harness::sweep::{SweepPlan, SweepRow, injections, row};
 use crate::image_file::ImageFile;
-use crate::summary::HOST;
-use crate::task::Task;
 
 /// Fly an image under every fault at three severities, and tell what each does.
 ///
@@ -22,20 +18,8 @@ use crate::task::Task;
 /// larger than it may be.
 #[derive(Debug, clap::Args)]
 pub(super) struct Sweep {
-    /// The policy image.
-    image: PathBuf,
-    /// The task to fly.
-    #[arg(long, value_parser = super::task)]
-    task: &'static Task,
-    /// What computes the actions: this host, at once, or a board, by its model.
-    #[arg(long, default_value = HOST, value_parser = super::board)]
-    board: BoardChoice,
-    /// Cost that an episode may incur; the paper's limit for the task, if not given.
-    #[arg(long, value_name = "D", value_parser = super::limit)]
-    limit: Option<CostLimit>,
-    /// Calls of the denoiser that an action may take; no limit, if not given.
-    #[arg(long, value_name = "N", default_value_t = usize::MAX, hide_default_value = true)]
-    max_steps: usize,
+    #[command(flatten)]
+    subject: Subject,
     /// Seeds, each with a chip of its own.
     #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..))]
     seeds: u32,
@@ -63,20 +47,10 @@ struct Report {
 
 impl Sweep {
     pub(super) fn run(self, output: Output) -> CommandResult {
-        let file = ImageFile::read(&self.image)?;
+        let file = ImageFile::read(&self.subject.image)?;
         let image = file.image()?;
-        let task = self.task;
-        task.plant()?;
-        let limit = self.limit.map_or_else(|| CostLimit::new(task.cost_limit), Ok)?;
-        let plan = FlightPlan {
-            task,
-            limit,
-            episodes: self.episodes,
-            seed: self.seed,
-            rate_hz: task.rate_hz,
-            max_steps: self.max_steps,
-        };
-        let sweep = SweepPlan { image: image.bytes(), plan, seeds: self.seeds, board: self.board };
+        let plan = self.subject.plan(self.seed, self.episodes)?;
+        let sweep = SweepPlan { image: image.bytes(), plan, seeds: self.seeds, board: self.subject.board };
         let faults: Vec<_> = match self.fault.as_slice() {
             [] => injections().collect(),
             faults => std::iter::once(None).chain(faults.iter().copied().map(Some)).collect(),
@@ -88,20 +62,14 @@ impl Sweep {
                 output.note(format_args!("flew {fault}"));
             }
         }
-        let board = self.board.map_or(HOST, |board| board.name);
-        let report = Report { task: task.name, board, cost_limit: limit.cost().to_f32(), rows };
+        let (task, board) = (plan.task.name, self.subject.board_name());
+        let report = Report { task, board, cost_limit: plan.limit.cost().to_f32(), rows };
         if let Some(path) = &self.output {
             file::write(path, report.markdown().as_bytes())?;
         }
         output.report(&report)?;
         let [range, budget] = report.violations();
-        match (range, budget) {
-            (0, 0) => Ok(()),
-            _ => {
-                Err(format!("{range} actions out of range and {budget} budget errors; do not fly this, report it")
-                    .into())
-            }
-        }
+        super::unbroken(range, budget)
     }
 }
 

@@ -24,14 +24,15 @@ pub struct RobotFlight {
     pub summary: FlightSummary,
 }
 
-/// Flies all episodes of a plan, or those until the chip no longer boots.
+/// Flies the episodes of a plan from number `first` on, or those until the
+/// chip no longer boots.
 ///
 /// # Errors
 /// [`FlightError`]
-pub fn fly_all(device: &mut Device, plan: &FlightPlan, setup: &Setup) -> Result<RobotFlight, FlightError> {
+pub fn fly_all(device: &mut Device, plan: &FlightPlan, setup: &Setup, first: u32) -> Result<RobotFlight, FlightError> {
     check(&PolicyImage::new_checked(device.image()).map_err(|_| FlightError::Image)?, plan)?;
     let (mut episodes, mut tallies, mut latencies) = (Vec::new(), Vec::new(), Vec::new());
-    for index in 0..plan.episodes {
+    for index in (first..).take(plan.episodes as usize) {
         let mut records = Vec::new();
         let ended = fly(device, plan, setup, index, &mut |record| records.push(*record))?;
         latencies.extend(match setup.board {

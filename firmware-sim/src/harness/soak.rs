@@ -9,6 +9,7 @@ use serde::Serialize;
 use super::sweep::SweepError;
 use super::{Device, Setup, Tally, fly};
 use crate::board::Board;
+use crate::chip::Chip;
 use crate::fault::{FaultKind, Injection};
 use crate::flight::{FlightError, FlightPlan, Use, episode_seed};
 
@@ -49,6 +50,24 @@ pub struct Soaked {
     pub journal_erases_per_year: f64,
     /// What was counted.
     pub tally: Tally,
+    /// Episodes with a budget error or an action out of range; there must be none.
+    pub breaches: Vec<Breach>,
+    /// The chip as it was before the first of them.
+    #[serde(skip)]
+    pub breached: Option<Chip>,
+}
+
+/// An episode in which something was found that must not be.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Breach {
+    /// Its index among the episodes of the soak.
+    pub episode: u32,
+    /// The faults that were injected.
+    pub faults: Vec<Injection>,
+    /// Budgets that grew, or were above what was left.
+    pub budget_errors: u64,
+    /// Actions beyond the policy's bounds that came to the actuators.
+    pub actions_out_of_range: u64,
 }
 
 /// Flies until the time is over. The chip is switched off after each episode;
@@ -69,7 +88,14 @@ pub fn soak(soak: &SoakPlan<'_>, progress: &mut dyn FnMut(f64)) -> Result<Soaked
         if with_faults {
             setup.faults = drawn(episode_seed(plan.seed, Use::Mixture, soaked.episodes));
         }
+        let chip = device.chip().clone();
         let ended = fly(&mut device, &plan, &setup, soaked.episodes, &mut |_| ())?;
+        let Tally { budget_errors, actions_out_of_range, .. } = ended.tally;
+        if budget_errors + actions_out_of_range > 0 {
+            let (episode, faults) = (soaked.episodes, setup.faults.clone());
+            soaked.breaches.push(Breach { episode, faults, budget_errors, actions_out_of_range });
+            soaked.breached.get_or_insert(chip);
+        }
         soaked.episodes += 1;
         soaked.safe_episodes += u32::from(ended.tally.cost <= limit);
         let mut tally = ended.tally;

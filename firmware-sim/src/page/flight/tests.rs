@@ -15,7 +15,7 @@ fn flown() -> String {
     let image = PolicyImage::new_checked(memory.as_slice()).unwrap();
     let faults = ["sensor-nan=0.2", "cost-lost=0.2"].map(|fault| fault.parse().unwrap());
     let setup = Setup::new(&plan, &image, Some(Board::named("nrf52840").unwrap()), faults.into());
-    let flight = fly_all(&mut Device::flashed(memory.as_slice()).unwrap(), &plan, &setup).unwrap();
+    let flight = fly_all(&mut Device::flashed(memory.as_slice()).unwrap(), &plan, &setup, 0).unwrap();
     page(&Told { flight: &flight, plan: &plan, setup: &setup, image: &image })
 }
 
