@@ -1,13 +1,17 @@
 //! The budget's log in flash: a reset or a power cut never refills it.
 //!
 //! What a reset leaves unknown is the cost of the action that was under way.
-//! So the log does not hold kappa itself but a *floor* below it, and no action
-//! is taken unless kappa less the worst cost of a step is at least the floor
-//! on flash. After a reset the floor is what is left: the interrupted action
-//! is charged as the worst, and nothing is ever given back. Where no record is
-//! valid, nothing is left. A floor is written twice, so that one record may
-//! decay; of an episode's beginning there is one, and where that decays, the
-//! floor of the episode before counts, which is no higher.
+//! So the log does not hold kappa itself but a *floor* below it, and no charge
+//! takes effect unless what it leaves, less the worst cost of a step, is at
+//! least the floor on flash: the floor is written *ahead* of the step. After a
+//! reset the floor is what is left: the interrupted action is charged as the
+//! worst, and nothing is ever given back, wherever the power failed or the
+//! firmware hung. Where no record is valid, nothing is left.
+//!
+//! A floor is written twice, so that one record may decay. Where both have, or
+//! one has and power was cut in the other, two places in a row are unreadable,
+//! and nothing is left. Of an episode's beginning there is one record, and where
+//! that decays, the floor of the episode before counts, which is no higher.
 //!
 //! Floors fall in steps of a *reserve*: the larger it is, the fewer records are
 //! written and the more an interrupted episode forfeits. Two records are written
@@ -20,6 +24,9 @@ use armor_core::units::Cost;
 use embedded_storage::nor_flash::NorFlash;
 
 use crate::log::{Log, LogError};
+
+/// Records of a floor.
+const COPIES: u32 = 2;
 
 /// How far below kappa a floor lies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,6 +55,8 @@ impl<F: NorFlash> Journal<F> {
     pub fn open(flash: F, region: Range<u32>, reserve: Reserve) -> Result<Self, LogError<F::Error>> {
         let log = Log::open(flash, region)?;
         let [floor, episode] = log.latest().unwrap_or_default();
+        // A floor below this one may have been written, and lost.
+        let floor = if log.unreadable() < COPIES { floor } else { 0 };
         Ok(Self { log, reserve, floor: Cost::from_raw(floor), episode })
     }
 
@@ -76,11 +85,22 @@ impl<F: NorFlash> Journal<F> {
         self.append(floor, self.episode.wrapping_add(1))
     }
 
-    /// To be called with the kappa of every step before its action is taken:
-    /// writes a record where the floor does not cover the action.
+    /// To be called before every control step, with the budget before it and
+    /// the cost that it is to charge: [`Journal::cover`] for what that leaves.
     ///
     /// # Errors
-    /// [`LogError::Flash`]; the action must not be taken then.
+    /// As there.
+    pub fn charge(&mut self, kappa: Cost, incurred: f32) -> Result<(), LogError<F::Error>> {
+        // A report that is no cost takes the whole budget.
+        self.cover(Cost::from_incurred(incurred).map_or(Cost::ZERO, |cost| kappa.saturating_sub(cost)))
+    }
+
+    /// To be called with the kappa that a control step will leave, before the
+    /// step and its action are taken: writes the floor where the one on flash
+    /// does not cover them.
+    ///
+    /// # Errors
+    /// [`LogError::Flash`]; no action of the policy must be taken then.
     pub fn cover(&mut self, kappa: Cost) -> Result<(), LogError<F::Error>> {
         if self.floor <= kappa.saturating_sub(self.reserve.step) {
             return Ok(());

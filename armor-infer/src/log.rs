@@ -6,8 +6,9 @@
 //!
 //! Records fill the erase blocks of a region one after the other, round and
 //! round. The valid one with the highest sequence counts; one that power was
-//! cut in is invalid and does not. A block is erased only when the one before
-//! it is full, so that the record that counts is never in it.
+//! cut in is invalid and does not. A block is erased before the last record of
+//! the one before it is written, so that the record that counts is never in it,
+//! and what follows that record is erased, unless something was written there.
 
 use core::ops::Range;
 
@@ -26,8 +27,12 @@ pub struct Log<F> {
     region: Range<u32>,
     /// Where the next record goes.
     next: u32,
+    /// Where the record that counts lies; the region's start where there is none.
+    latest_at: u32,
     sequence: u32,
     latest: Option<[u32; 2]>,
+    /// Places after the latest record that hold no record and are not erased.
+    unreadable: u32,
 }
 
 /// Why a log cannot be kept.
@@ -68,15 +73,29 @@ impl<F: NorFlash> Log<F> {
         if !is_whole || !divides(F::WRITE_SIZE) || !divides(F::READ_SIZE) {
             return Err(LogError::Region);
         }
-        let (mut next, mut sequence, mut latest) = (region.start, 0, None);
+        let (mut next, mut latest_at, mut sequence, mut latest) = (region.start, region.start, 0, None);
         for at in region.clone().step_by(RECORD_BYTES as usize) {
             if let Some((other, words)) = decode(&read(&mut flash, at)?)
                 && (latest.is_none() || other > sequence)
             {
-                (next, sequence, latest) = (at + RECORD_BYTES, other, Some(words));
+                (next, latest_at, sequence, latest) = (at + RECORD_BYTES, at, other, Some(words));
             }
         }
-        Ok(Self { flash, region, next, sequence, latest })
+        let mut unreadable = 0;
+        if latest.is_some() {
+            // These stay until a newer record is whole, for they tell that there may have been one.
+            (unreadable, next) = unreadable_from(&mut flash, &region, next)?;
+        }
+        let mut log = Self { flash, region, next, latest_at, sequence, latest, unreadable };
+        log.pass_over_remains()?;
+        Ok(log)
+    }
+
+    /// How many places after the record that counts held no record when the log
+    /// was opened, and were not erased: what power was cut in, and records that
+    /// have decayed since.
+    pub const fn unreadable(&self) -> u32 {
+        self.unreadable
     }
 
     /// The words of the record that counts, if there is one.
@@ -96,7 +115,7 @@ impl<F: NorFlash> Log<F> {
         self.next = at + RECORD_BYTES;
         self.sequence = sequence;
         self.flash.write(at, &encode(sequence, words)).map_err(LogError::Flash)?;
-        self.latest = Some(words);
+        (self.latest, self.latest_at) = (Some(words), at);
         Ok(())
     }
 
@@ -105,21 +124,71 @@ impl<F: NorFlash> Log<F> {
         self.flash
     }
 
-    /// Moves on to an erased place, over what a power cut left, and erases the
-    /// block of the oldest records where the one before it is full.
-    fn find_room(&mut self) -> Result<(), LogError<F::Error>> {
+    /// Moves on to the next block where this one is not erased from its first
+    /// erased place on: records in between would be followed by what is none.
+    fn pass_over_remains(&mut self) -> Result<(), LogError<F::Error>> {
         let block = F::ERASE_SIZE as u32;
-        while !self.next.is_multiple_of(block) {
-            if read(&mut self.flash, self.next)? == ERASED {
+        let mut at = self.next;
+        let mut is_erased = false;
+        while !at.is_multiple_of(block) {
+            let place = read(&mut self.flash, at)? == ERASED;
+            at += RECORD_BYTES;
+            if is_erased && !place {
+                self.next = at.next_multiple_of(block);
                 return Ok(());
             }
+            is_erased |= place;
+        }
+        Ok(())
+    }
+
+    /// Moves on to an erased place, over what a power cut left, to the next
+    /// block where this one is full; and erases the block after the last place
+    /// of one.
+    fn find_room(&mut self) -> Result<(), LogError<F::Error>> {
+        let block = F::ERASE_SIZE as u32;
+        while !self.next.is_multiple_of(block) && read(&mut self.flash, self.next)? != ERASED {
             self.next += RECORD_BYTES;
         }
-        if self.next >= self.region.end {
-            self.next = self.region.start;
+        if self.next.is_multiple_of(block) {
+            self.next = self.around(self.next);
+            self.clear(self.next)?;
         }
-        self.flash.erase(self.next, self.next + block).map_err(LogError::Flash)
+        let after = self.next + RECORD_BYTES;
+        let start = self.next - self.next % block;
+        let counts_here = self.latest.is_some() && (start..after).contains(&self.latest_at);
+        if after.is_multiple_of(block) && counts_here { self.clear(self.around(after)) } else { Ok(()) }
     }
+
+    /// A place, or the region's start where it is the region's end.
+    const fn around(&self, at: u32) -> u32 {
+        if at < self.region.end { at } else { self.region.start }
+    }
+
+    /// Erases the block that starts at `start`, unless it is erased.
+    fn clear(&mut self, start: u32) -> Result<(), LogError<F::Error>> {
+        let end = start + F::ERASE_SIZE as u32;
+        for at in (start..end).step_by(RECORD_BYTES as usize) {
+            if read(&mut self.flash, at)? != ERASED {
+                return self.flash.erase(start, end).map_err(LogError::Flash);
+            }
+        }
+        Ok(())
+    }
+}
+
+/// How many places from `at` on, round the region, are neither erased nor a
+/// whole record; and the place after them.
+fn unreadable_from<F: NorFlash>(flash: &mut F, region: &Range<u32>, at: u32) -> Result<(u32, u32), LogError<F::Error>> {
+    let (mut count, mut after) = (0, at);
+    for place in (at..region.end).chain(region.start..at).step_by(RECORD_BYTES as usize) {
+        let bytes = read(flash, place)?;
+        if bytes == ERASED || decode(&bytes).is_some() {
+            break;
+        }
+        (count, after) = (count + 1, place + RECORD_BYTES);
+    }
+    Ok((count, after))
 }
 
 fn encode(sequence: u32, [first, second]: [u32; 2]) -> [u8; RECORD_BYTES as usize] {

@@ -27,6 +27,8 @@ pub struct CostMeter {
     worst: Cost,
     /// The first step that is not settled; none after a reset, until a report says.
     next: Option<u32>,
+    /// Steps that were due and charged since a reset, until a report says where the episode stands.
+    blind: u32,
 }
 
 /// What [`CostMeter::settle`] found.
@@ -43,13 +45,15 @@ pub struct Settled {
 impl CostMeter {
     /// The meter of a new episode; no step costs more than `worst`.
     pub const fn new(worst: Cost) -> Self {
-        Self { worst, next: Some(0) }
+        Self { worst, next: Some(0), blind: 0 }
     }
 
     /// The meter after a reset in mid-episode: it goes on from the first
-    /// reports that come. The steps until then are the journal's to cover.
+    /// reports that come. Until then all that are due by a clock that begins
+    /// at 0 are charged as the worst; the steps while the controller was down
+    /// are the journal's to cover.
     pub const fn resumed(worst: Cost) -> Self {
-        Self { worst, next: None }
+        Self { worst, next: None, blind: 0 }
     }
 
     /// The first step that is not settled; none where no report came since a reset.
@@ -64,7 +68,9 @@ impl CostMeter {
         let numbers = || reports.iter().map(|report| report.step);
         let (Some(first), Some(last)) = (self.next.or(numbers().min()), numbers().max().or(self.next)) else {
             // Nobody has said yet where the episode stands.
-            return Settled { incurred: self.worst.to_f32(), missing: 1, stale: 0 };
+            let missing = due.saturating_sub(self.blind).max(1);
+            self.blind = self.blind.max(due);
+            return Settled { incurred: self.worst.saturating_mul(missing).to_f32(), missing, stale: 0 };
         };
         let known = if numbers().next().is_some() { last.saturating_add(1) } else { first };
         let end = known.max(due).max(first);
@@ -136,6 +142,10 @@ mod tests {
     fn after_a_reset_it_goes_on_where_the_reports_are() {
         let mut meter = CostMeter::resumed(cost(1.0));
         assert_eq!(meter.settle(&[], 0), settled(1.0, 1, 0));
+        // Two plant steps to a control step, and a clock that jumps.
+        assert_eq!(meter.settle(&[], 2), settled(2.0, 2, 0));
+        assert_eq!(meter.settle(&[], 8), settled(6.0, 6, 0));
+        assert_eq!(meter.settle(&[], 8), settled(1.0, 1, 0));
         assert_eq!(meter.settle(&reports(&[(41, 0.5), (42, 0.0)]), 0), settled(0.5, 0, 0));
         assert_eq!(meter.next(), Some(43));
     }

@@ -216,9 +216,9 @@ impl Chip {
         self.flash
     }
 
-    /// Erases of each block of the budget's journal.
-    pub fn journal_wear(&self) -> &[u32] {
-        &self.flash.wear()[boot_log::BLOCKS..boot_log::BLOCKS + JOURNAL_BLOCKS]
+    /// Words that were written to its flash and blocks erased, since it was made or read from its file.
+    pub const fn operations(&self) -> u64 {
+        self.flash.operations()
     }
 
     /// The first bit of a slot in flash.

@@ -129,7 +129,7 @@ impl fmt::Display for Report {
         writeln!(f, "episodes in limit   {:>10} of {}", soaked.safe_episodes, soaked.episodes)?;
         writeln!(f, "chips flashed anew  {:>10}", soaked.dead_chips)?;
         let (erases, year) = (soaked.journal_erases, soaked.journal_erases_per_year);
-        writeln!(f, "journal             {erases:>10} erases of a block, {year:.0} in a year")?;
+        writeln!(f, "journal             {erases:>10.1} erases of a block, {year:.0} in a year")?;
         writeln!(f, "{}", soaked.tally)?;
         write!(f, "took                {:>10.1} s", self.seconds)?;
         for breach in &soaked.breaches {

@@ -1,8 +1,6 @@
 //! The robot around a controller: plant, sensors, actuators and cost monitor.
 //!
-//! The actuators hold an action until another comes, and fall back by
-//! themselves where none comes for [`ACTUATOR_PATIENCE`] control steps. The
-//! cost monitor numbers the plant's steps and reports each.
+//! The cost monitor numbers the plant's steps and reports each.
 
 use std::time::Duration;
 
@@ -10,23 +8,18 @@ use armor_core::image::Sections;
 use armor_core::noise::below;
 use armor_core::units::{Cost, Micros};
 use armor_infer::meter::CostReport;
-use nalgebra::{SVector, Vector2};
+use nalgebra::Vector2;
 
+use super::Setup;
+use super::actuators::{Action, Actuators};
 use super::record::{Decision, Notice, NoticeSet, Record};
 use super::referee::Referee;
-use super::{Setup, action_bounds};
 use crate::fault::{FaultKind, Injector};
 use crate::flight::FlightPlan;
-use crate::host::ACTION;
 use crate::plant::{Plant, Scene, Thing};
 
-/// Control steps without an action after which the actuators fall back.
-const ACTUATOR_PATIENCE: u32 = 4;
 /// Control steps that a late cost report is late by at most.
 const LATEST_REPORT: u32 = 5;
-
-/// An action at the actuators.
-pub(super) type Action = SVector<f32, ACTION>;
 
 /// A robot in an episode.
 pub(super) struct Robot<'s> {
@@ -52,17 +45,6 @@ pub(super) struct Robot<'s> {
     pub(super) flash_flips: Vec<[u32; 2]>,
     /// Whether the controller is down.
     is_down: bool,
-}
-
-struct Actuators {
-    fallback: Action,
-    /// The action at the start of the plant's step, and the one that has come since.
-    held: Action,
-    action: Action,
-    /// When that came.
-    since: Duration,
-    arrived: Option<Decision>,
-    has_given_up: bool,
 }
 
 impl<'s> Robot<'s> {
@@ -104,14 +86,7 @@ impl<'s> Robot<'s> {
             duration: setup.period(plan) / hold,
             transport: setup.transport,
             steps: 0,
-            actuators: Actuators {
-                fallback,
-                held: fallback,
-                action: fallback,
-                since: Duration::ZERO,
-                arrived: None,
-                has_given_up: false,
-            },
+            actuators: Actuators::new(fallback),
             reports: Vec::new(),
             record,
             sink,
@@ -136,11 +111,10 @@ impl<'s> Robot<'s> {
         let end = self.step_end();
         let start = end - self.duration;
         let actuators = &mut self.actuators;
-        let late = actuators.since.saturating_sub(start).as_secs_f64() / self.duration.as_secs_f64();
+        let late = actuators.since().saturating_sub(start).as_secs_f64() / self.duration.as_secs_f64();
         let goal = goal(&self.plant.scene());
-        let [held, action] = [&actuators.held, &actuators.action].map(|action| &action.as_slice()[..self.action_dim]);
+        let [held, action] = actuators.of_step().map(|action| &action.as_slice()[..self.action_dim]);
         let outcome = self.plant.step_late(held, action, late);
-        actuators.held = actuators.action;
         self.steps = if outcome.done { self.horizon } else { self.steps + 1 };
         self.record.reward += outcome.reward;
         self.record.cost += outcome.cost;
@@ -150,9 +124,7 @@ impl<'s> Robot<'s> {
         if now_goal != goal {
             self.goals.extend(now_goal);
         }
-        if end - self.actuators.since > self.duration * self.hold * ACTUATOR_PATIENCE && !self.actuators.has_given_up {
-            self.actuators.action = self.actuators.fallback;
-            self.actuators.has_given_up = true;
+        if self.actuators.end_step(end, self.duration * self.hold) {
             self.note(Notice::NoAction);
         }
         if self.steps.is_multiple_of(self.hold) || self.is_done() {
@@ -163,14 +135,10 @@ impl<'s> Robot<'s> {
     /// Hands the control step over, and begins another.
     fn end_record(&mut self) {
         let record = &mut self.record;
-        record.decision = match self.actuators.arrived.take() {
-            _ if self.is_down => Decision::Down,
-            Some(decision) => decision,
-            None if self.actuators.has_given_up => Decision::Fallback,
-            None => Decision::Held,
-        };
+        let decision = self.actuators.take_decision();
+        record.decision = if self.is_down { Decision::Down } else { decision };
         record.injected = self.injector.take_struck();
-        (record.left, record.action) = (self.referee.left(), self.actuators.action);
+        (record.left, record.action) = (self.referee.left(), self.actuators.action());
         record.place = self.plant.scene().robot;
         (self.sink)(record);
         let next = Micros((self.duration * self.steps).as_micros() as u64);
@@ -224,9 +192,7 @@ impl<'s> Robot<'s> {
             return;
         }
         self.referee.action(&action.as_slice()[..self.action_dim]);
-        let actuators = &mut self.actuators;
-        (actuators.action, actuators.since) = (*action, now);
-        (actuators.arrived, actuators.has_given_up) = (Some(decision), false);
+        self.actuators.arrive(*action, now, decision);
     }
 
     /// The controller has a budget; the steps that it was charged for, where it knows.
@@ -254,6 +220,11 @@ impl<'s> Robot<'s> {
     pub(super) fn scene(&self) -> Scene {
         self.plant.scene()
     }
+}
+
+/// The bounds of each action entry.
+fn action_bounds(sections: &Sections<'_>) -> Vec<(f32, f32)> {
+    sections.action_low.iter().copied().zip(sections.action_high.iter().copied()).collect()
 }
 
 /// The goal of a scene and its radius.

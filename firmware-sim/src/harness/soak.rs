@@ -9,8 +9,9 @@ use serde::Serialize;
 use super::sweep::SweepError;
 use super::{Device, Setup, Tally, fly};
 use crate::board::Board;
-use crate::chip::Chip;
+use crate::chip::{Chip, JOURNAL};
 use crate::fault::{FaultKind, Injection};
+use crate::flash::WRITE_BYTES;
 use crate::flight::{FlightError, FlightPlan, Use, episode_seed};
 
 /// A fault is there in one of so many episodes.
@@ -44,8 +45,8 @@ pub struct Soaked {
     pub dead_chips: u32,
     /// Virtual hours.
     pub hours: f64,
-    /// Erases of the journal's most worn block, over all chips.
-    pub journal_erases: u32,
+    /// Erases of each block of the journal that its records come to, over all chips.
+    pub journal_erases: f64,
     /// The same in a year of this.
     pub journal_erases_per_year: f64,
     /// What was counted.
@@ -83,7 +84,7 @@ pub fn soak(soak: &SoakPlan<'_>, progress: &mut dyn FnMut(f64)) -> Result<Soaked
     let limit = f64::from(plan.limit.cost().to_f32());
     let mut device = Device::flashed(image)?;
     let mut soaked = Soaked::default();
-    let mut retired = 0;
+    let (mut words, mut before) = (0, device.chip().operations());
     while soaked.tally.steps < wanted {
         if with_faults {
             setup.faults = drawn(episode_seed(plan.seed, Use::Mixture, soaked.episodes));
@@ -104,22 +105,20 @@ pub fn soak(soak: &SoakPlan<'_>, progress: &mut dyn FnMut(f64)) -> Result<Soaked
             _ => {
                 tally.note_slot(true);
                 soaked.dead_chips += 1;
-                retired += worn(&device);
+                words += device.chip().operations() - before;
                 device = Device::flashed(image)?;
+                before = device.chip().operations();
             }
         }
         soaked.tally = [std::mem::take(&mut soaked.tally), tally].into_iter().sum();
         progress(soaked.tally.steps as f64 / wanted.max(1) as f64);
     }
     soaked.hours = soaked.tally.steps as f64 / f64::from(plan.rate_hz) / 3600.0;
-    soaked.journal_erases = retired + worn(&device);
-    soaked.journal_erases_per_year = f64::from(soaked.journal_erases) * YEAR / soaked.hours;
+    words += device.chip().operations() - before;
+    // But for an erase here and there, and the boot log's, these are words of the journal, which goes round.
+    soaked.journal_erases = words as f64 * WRITE_BYTES as f64 / JOURNAL.len() as f64;
+    soaked.journal_erases_per_year = soaked.journal_erases * YEAR / soaked.hours;
     Ok(soaked)
-}
-
-/// Erases of a chip's most worn block of the journal.
-fn worn(device: &Device) -> u32 {
-    device.chip().journal_wear().iter().copied().max().unwrap_or(0)
 }
 
 /// The faults of an episode.

@@ -1,10 +1,14 @@
+use armor_core::image::{HEADER_BYTES, PolicyImage, SectionKind};
 use armor_core::shape::Shape;
-use armor_core::units::CostLimit;
+use armor_core::units::{Cost, CostLimit};
 
+use super::flip::flipped;
 use super::*;
+use crate::board::Board;
 use crate::fault::FaultKind;
 use crate::fixture::{BALL_RUN, Parts};
-use crate::flight;
+use crate::flight::{self, FlightPlan};
+use crate::memory::AlignedBytes;
 use crate::task::Task;
 
 fn plan(task: &str, limit: f32) -> FlightPlan {
@@ -116,6 +120,37 @@ fn a_slow_clock_without_reports_forgets_no_cost_across_a_reset() {
     for seed in 0..30 {
         let plan = FlightPlan { seed, episodes: 1, ..plan("point-circle", 39.0) };
         let (_, tally) = flown(&plan, board(5_000_000), &faults);
+        assert_eq!((tally.budget_errors, tally.actions_out_of_range), (0, 0), "seed {seed}: {tally:?}");
+    }
+}
+
+/// A charge that takes more than a step can cost, as a report does that is no
+/// cost, must be in flash before the firmware hangs or loses power.
+#[test]
+fn a_charge_is_remembered_by_a_firmware_that_is_reset_in_the_same_step() {
+    let faults = ["cost-negative=0.02", "watchdog-reset=0.05", "brown-out=0.05"];
+    let (mut resets, mut coincidences) = (0, 0);
+    for seed in 0..40 {
+        let plan = FlightPlan { seed, episodes: 1, ..plan("point-circle", 39.0) };
+        let (episodes, tally) = flown(&plan, None, &faults);
+        assert_eq!((tally.budget_errors, tally.actions_out_of_range), (0, 0), "seed {seed}: {tally:?}");
+        resets += tally.notices(Notice::Reset);
+        let hangs = |record: &Record| record.injected.iter().any(|kind| kind == FaultKind::WatchdogReset);
+        let coincides =
+            |pair: &[Record]| pair[0].kappa > pair[1].kappa && pair[1].kappa == Some(Cost::ZERO) && hangs(&pair[1]);
+        coincidences += episodes.iter().flat_map(|records| records.windows(2)).filter(|pair| coincides(pair)).count();
+    }
+    assert!(resets > 200 && coincidences > 0, "{resets}, {coincidences}");
+}
+
+/// The same at a fraction of the plant's rate, where a control step may cost as much as two plant steps.
+#[test]
+fn a_controller_of_half_the_rate_forgets_no_cost_across_a_reset() {
+    let faults = ["clock-slow=0.2", "link-loss=0.05", "cost-lost=0.2", "watchdog-reset=0.02", "clock-jump=0.05"];
+    for seed in 0..30 {
+        let plan = plan("point-circle", 39.0);
+        let plan = FlightPlan { seed, episodes: 1, rate_hz: plan.task.rate_hz / 2, ..plan };
+        let (_, tally) = flown(&plan, None, &faults);
         assert_eq!((tally.budget_errors, tally.actions_out_of_range), (0, 0), "seed {seed}: {tally:?}");
     }
 }

@@ -1,39 +1,34 @@
 //! What the microcontroller does between a boot and a reset: the loop that a
 //! firmware around `armor-infer` is made of.
 //!
-//! A sample and the cost reports come; the reports are settled; the longest
-//! rung that ends in time answers; the journal covers the budget; the action
-//! goes out. Where no chain answers, the last action is held for a few control
+//! A sample and the cost reports come; the reports are settled; the journal
+//! covers what they charge; the longest rung that ends in time answers; the
+//! action goes out. Where no chain answers, the last action is held for a few control
 //! steps, and then the fallback is taken. Now and then the checksum of the
 //! weights in RAM is taken again; where it is wrong, the firmware resets itself.
 
-use std::time::{Duration, Instant};
+mod answer;
+
+use std::time::Duration;
 
 use armor_core::image::{PolicyImage, Sections};
-use armor_core::noise::{Noise, below, uniform};
+use armor_core::noise::Noise;
 use armor_core::units::{Cost, CostLimit};
 use armor_infer::journal::Journal;
 use armor_infer::meter::CostMeter;
-use armor_infer::{Fault, Step};
 
+use super::actuators::Action;
 use super::clock::Agenda;
 use super::deadline::Deadline;
 use super::record::{Decision, Notice};
-use super::robot::{Action, Robot};
-use super::{Setup, rung_times};
+use super::robot::Robot;
+use super::setup::{Setup, rung_times};
 use crate::board::model::Modelled;
 use crate::fault::FaultKind;
 use crate::flash::NorModel;
 use crate::flight::{FlightError, FlightPlan};
-use crate::host::{self, ACTION, Pilot};
+use crate::host;
 
-/// Answers without a chain in which the last action is held.
-const HOLDS: u32 = 3;
-/// Answers after which the weights in RAM are checked.
-const SCRUB: u64 = 50;
-/// Samples without a cost report after which a control step is charged for
-/// two, for the clock that counts them may be slow.
-const SILENCE: u32 = 4;
 /// Time without power after a brown-out.
 pub(super) const POWER_OFF: Duration = Duration::from_millis(20);
 
@@ -88,6 +83,8 @@ pub(super) struct Firmware<'s> {
     answer: Option<(Duration, usize, Action, Decision)>,
     /// What is on its way to the actuators.
     sent: Option<(Action, Decision)>,
+    /// Whether the journal covers the step that is being computed.
+    is_covered: bool,
     last: Option<Action>,
     holds: u32,
     is_hung: bool,
@@ -135,6 +132,7 @@ impl<'s> Firmware<'s> {
             sample: None,
             answer: None,
             sent: None,
+            is_covered: false,
             last: None,
             holds: 0,
             is_hung: false,
@@ -185,9 +183,13 @@ impl<'s> Firmware<'s> {
                     }
                     self.sample(image.sections(), robot, agenda);
                 }
-                Event::Receive => self.receive(controller.as_mut(), robot, agenda),
+                Event::Receive => {
+                    if let Some(end) = self.receive(controller.as_mut(), (robot, agenda), journal) {
+                        return Ok(end);
+                    }
+                }
                 Event::Answer => {
-                    if let Some(end) = self.release(image.sections(), robot, agenda, journal) {
+                    if let Some(end) = self.release(image.sections(), robot, agenda) {
                         return Ok(end);
                     }
                 }
@@ -223,125 +225,4 @@ impl<'s> Firmware<'s> {
         self.sample = Some((now, robot.sense(sections), due));
         agenda.at(now + self.setup.transport, Event::Receive);
     }
-
-    /// Sample and reports are there: the controller steps.
-    fn receive(&mut self, controller: &mut dyn Pilot, robot: &mut Robot<'_>, agenda: &mut Agenda<Event>) {
-        let now = agenda.now();
-        let Some((sampled, state, due)) = self.sample.take() else { return };
-        let reports = robot.take_reports(now);
-        self.silent = if reports.is_empty() { self.silent + 1 } else { 0 };
-        let settled = self.meter.settle(&reports, due);
-        if let Some(next) = self.meter.next() {
-            // The monitor knows the time: a clock that is slow must not forget what it says.
-            self.due = self.due.max(next + self.hold);
-        }
-        if self.silent > SILENCE {
-            self.due += self.hold;
-        }
-        if settled.missing > 0 {
-            robot.note(Notice::MissingCost);
-        }
-        if settled.stale > 0 {
-            robot.note(Notice::StaleCost);
-        }
-
-        let steps = self.deadline.steps();
-        let is_broken = self.weights == Weights::Broken;
-        let mut state = state.unwrap_or_default();
-        if is_broken {
-            state.fill(f32::NAN);
-        }
-        let started = Instant::now();
-        let mut step = controller.step_within(&state, settled.incurred, steps);
-        self.host_times.push(started.elapsed());
-        if is_broken && step.fault == Some(Fault::StateNotFinite) {
-            step.fault = Some(Fault::ActionNotFinite);
-        }
-        self.kappa = step.kappa;
-        robot.budget(step.kappa, self.meter.next());
-        if let Some(fault) = step.fault {
-            robot.note(Notice::of(fault));
-        }
-        if robot.injector.strikes(FaultKind::WatchdogReset) {
-            self.is_hung = true;
-            return;
-        }
-        let latency = self.latency(&step).mul_f64(robot.injector.stretch());
-        let record = robot.record();
-        (record.rung, record.fault, record.latency) = (step.rung, step.fault, step.rung.map(|_| latency));
-        let (action, decision) = self.decide(&step);
-        self.answer = Some((sampled, steps, action, decision));
-        agenda.at(now + latency, Event::Answer);
-    }
-
-    /// What to do with a step: its action, or the last one for a while, or the fallback.
-    fn decide(&mut self, step: &Step<ACTION>) -> (Action, Decision) {
-        if step.rung.is_some() {
-            self.holds = 0;
-            self.last = Some(step.action);
-            return (step.action, Decision::Policy);
-        }
-        self.holds += 1;
-        match self.last.filter(|_| self.holds <= HOLDS) {
-            Some(last) => (last, Decision::Held),
-            None => (step.action, Decision::Fallback),
-        }
-    }
-
-    /// How long a step takes on the board, with the jitter of this answer; no time on the host.
-    fn latency(&mut self, step: &Step<ACTION>) -> Duration {
-        self.answers += 1;
-        let modelled = step.rung.and_then(|rung| self.actions.get(rung).copied().flatten());
-        let share = f64::from(uniform(self.jitter.words(0, self.answers, 0)[0]));
-        modelled.map_or(Duration::ZERO, |action| action.time + (action.worst - action.time).mul_f64(share))
-    }
-
-    /// The answer is there: the journal covers its budget, and it goes out,
-    /// unless it is late.
-    fn release(
-        &mut self,
-        sections: &Sections<'_>,
-        robot: &mut Robot<'_>,
-        agenda: &mut Agenda<Event>,
-        journal: &mut Option<Journal<NorModel>>,
-    ) -> Option<End> {
-        let now = agenda.now();
-        let (sampled, steps, mut action, mut decision) = self.answer.take()?;
-        self.last_kick = now;
-        let arrival = now + self.setup.transport;
-        let is_late = arrival > sampled + self.period;
-        self.deadline.answered(steps, is_late);
-        if robot.injector.strikes(FaultKind::BrownOut) {
-            let draw = robot.injector.word(FaultKind::BrownOut, 1);
-            *journal = journal.take().and_then(|journal| cut_soon(journal, self.setup, draw));
-            let _ = journal.as_mut()?.cover(self.kappa);
-            robot.note(Notice::Journal);
-            return Some(End::Reset(POWER_OFF));
-        }
-        if is_late {
-            robot.note(Notice::Late);
-            return None;
-        }
-        if journal.as_mut().is_none_or(|journal| journal.cover(self.kappa).is_err()) {
-            robot.note(Notice::Journal);
-            decision = Decision::Fallback;
-            for (entry, fallback) in action.iter_mut().zip(sections.action_fallback) {
-                *entry = *fallback;
-            }
-        }
-        if self.answers.is_multiple_of(SCRUB) && self.weights != Weights::Whole {
-            robot.note(Notice::Weights);
-            return Some(End::Reset(Duration::ZERO));
-        }
-        self.sent = Some((action, decision));
-        agenda.at(arrival, Event::Actuate);
-        None
-    }
-}
-
-/// The journal, on a flash whose power fails within its next few operations.
-fn cut_soon(journal: Journal<NorModel>, setup: &Setup, draw: u32) -> Option<Journal<NorModel>> {
-    let mut flash = journal.into_flash();
-    flash.cut_power_after(below(draw, 5).into(), draw.into());
-    Journal::open(flash, crate::chip::JOURNAL, setup.reserve).ok()
 }
