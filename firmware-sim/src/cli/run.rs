@@ -114,6 +114,11 @@ impl Run {
         if self.board.is_some() && self.best_of > 1 {
             return Err("the boards' models time a single action; fly the best of several on the host".into());
         }
+        if self.first.checked_add(self.episodes).is_none() {
+            return Err(
+                format!("no episode is numbered above {}; fly an earlier --first or fewer", u32::MAX - 1).into()
+            );
+        }
         let limit = self.limit.map_or_else(|| CostLimit::new(task.cost_limit), Ok)?;
         let rate_hz = self.rate.unwrap_or(task.rate_hz);
         let plan =
@@ -168,6 +173,7 @@ impl Run {
             }
         }
         let RobotFlight { tally, latency, summary, .. } = flight;
+        let [range, budget] = [tally.actions_out_of_range, tally.budget_errors];
         output.report(&Report {
             slot: boot.slot,
             image_bytes: image.bytes().len(),
@@ -178,7 +184,8 @@ impl Run {
             telemetry,
             page,
             latency,
-        })
+        })?;
+        super::unbroken(range, budget)
     }
 }
 
@@ -191,6 +198,9 @@ impl fmt::Display for Report {
                 writeln!(f, "{what:<20}{}", path.display())?;
             }
         }
-        write!(f, "\n{} of an action\n{}", self.summary.latency_of(), self.latency.to_string().trim_end())
+        match self.latency.to_string().trim_end() {
+            "" => write!(f, "\nno chain answered"),
+            histogram => write!(f, "\n{} of an action\n{histogram}", self.summary.latency_of()),
+        }
     }
 }

@@ -78,9 +78,6 @@ impl Soak {
                 output.note(format_args!("{:>3} %, {:.0} s", 100 * told / NOTES, started.elapsed().as_secs_f64()));
             }
         })?;
-        if let (Some(path), Some(chip)) = (&self.output, &soaked.breached) {
-            chip.write(path)?;
-        }
         let report = Report {
             task: plan.task.name,
             board: self.subject.board_name(),
@@ -88,11 +85,14 @@ impl Soak {
             cost_limit: plan.limit.cost().to_f32(),
             seed: self.seed,
             max_steps: plan.max_steps,
-            chip: self.output,
+            chip: self.output.clone(),
             seconds: started.elapsed().as_secs_f64(),
             soaked,
         };
         output.report(&report)?;
+        if let (Some(path), Some(chip)) = (&self.output, &report.soaked.breached) {
+            chip.write(path)?;
+        }
         let tally = &report.soaked.tally;
         super::unbroken(tally.actions_out_of_range, tally.budget_errors)
     }
@@ -104,11 +104,10 @@ impl Report {
         let chip = self.chip.as_ref().map_or_else(|| "CHIP".into(), |path| path.display().to_string());
         let mut text = format!("firmware-sim run --chip {chip} --task {} --board {}", self.task, self.board);
         let mut add = |words: &str| text.push_str(&format!(" \\\n    {words}"));
-        if self.max_steps != usize::MAX {
-            add(&format!("--max-steps {}", self.max_steps));
-        }
+        let steps =
+            if self.max_steps == usize::MAX { String::new() } else { format!("--max-steps {} ", self.max_steps) };
         let (limit, seed, episode) = (self.cost_limit, self.seed, breach.episode);
-        add(&format!("--limit {limit} --seed {seed} --first {episode} --episodes 1 -o error.html"));
+        add(&format!("{steps}--limit {limit} --seed {seed} --first {episode} --episodes 1 -o error.html"));
         for pair in breach.faults.chunks(2) {
             let words: Vec<_> = pair.iter().map(|fault| format!("--fault {fault}")).collect();
             add(&words.join(" "));
@@ -146,5 +145,35 @@ impl fmt::Display for Report {
                 write!(f, "\n\nThe first of these alone{keep}:\n{}", self.command(first))
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Were an error ever found: its episode, and the command that flies it alone, in 80 columns.
+    #[test]
+    fn an_error_tells_how_to_see_it_alone() {
+        let faults = ["sensor-infinity=0.2", "cost-negative=0.01", "brown-out"].map(|fault| fault.parse().unwrap());
+        let breach = Breach { episode: 2519, faults: faults.into(), budget_errors: 1, actions_out_of_range: 0 };
+        let report = Report {
+            task: "point-circle",
+            board: "stm32h743",
+            rate_hz: 50,
+            cost_limit: 20.0,
+            seed: 7,
+            max_steps: 1,
+            chip: Some("error.chip".into()),
+            soaked: Soaked { breaches: vec![breach], ..Soaked::default() },
+            seconds: 1.0,
+        };
+        let text = report.to_string();
+        assert!(text.contains("\nepisode 2519: 1 budget errors, 0 actions out of range\n"), "{text}");
+        let command = "firmware-sim run --chip error.chip --task point-circle --board stm32h743 \\\n    \
+                       --max-steps 1 --limit 20 --seed 7 --first 2519 --episodes 1 -o error.html \\\n    \
+                       --fault sensor-infinity=0.2 --fault cost-negative=0.01 \\\n    --fault brown-out=0.005";
+        assert!(text.ends_with(command), "{text}");
+        assert!(text.lines().all(|line| line.len() <= 80), "{text}");
     }
 }

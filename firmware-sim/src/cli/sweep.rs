@@ -64,10 +64,10 @@ impl Sweep {
         }
         let (task, board) = (plan.task.name, self.subject.board_name());
         let report = Report { task, board, cost_limit: plan.limit.cost().to_f32(), rows };
+        output.report(&report)?;
         if let Some(path) = &self.output {
             file::write(path, report.markdown().as_bytes())?;
         }
-        output.report(&report)?;
         let [range, budget] = report.violations();
         super::unbroken(range, budget)
     }

@@ -1,6 +1,7 @@
 //! The command line, as a shell sees it.
 
 mod answers;
+mod faults;
 #[path = "../../src/fixture.rs"]
 mod fixture;
 mod refusals;
