@@ -13,6 +13,8 @@ mod point_goal;
 mod rolling_ball;
 mod scene;
 mod style;
+#[cfg(test)]
+mod testing;
 
 use nalgebra::Vector2;
 

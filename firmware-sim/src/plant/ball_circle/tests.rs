@@ -1,11 +1,6 @@
 use super::*;
+use crate::plant::testing::{observed, scripted};
 use crate::recorded::ball_circle_transitions;
-
-fn observed(plant: &BallCircle) -> [f32; BallCircle::STATE] {
-    let mut state = [0.0; BallCircle::STATE];
-    plant.observe(&mut state);
-    state
-}
 
 /// In Bullet a contact point outlives its contact by some sub-steps. At these
 /// sub-steps a slow ball leaves such a point so near to the plane that it takes
@@ -88,31 +83,18 @@ fn an_observation_is_taken_and_told_again() {
     for _ in 0..20 {
         plant.step(&[0.4, -0.9]);
     }
-    let told = observed(&plant);
+    let told = observed::<{ BallCircle::STATE }>(&plant);
     let mut other = BallCircle::default();
     other.set_observation(&told);
-    for (again, told) in observed(&other).into_iter().zip(told) {
+    for (again, told) in observed::<{ BallCircle::STATE }>(&other).into_iter().zip(told) {
         assert!((again - told).abs() <= 1e-6);
     }
     assert!((f64::from(told[7]) - 0.1 * (plant.ball.position.norm() - 7.0)).abs() < 1e-7);
 }
 
+/// Normalised reward and cost of 20 episodes.
 fn fly(margin: f64) -> (f64, f64) {
-    let task = crate::task::Task::named("ball-circle").unwrap();
-    let mut plant = BallCircle::default();
-    let style = Style { pace: 6.0, margin, look: 0.3 };
-    let (mut rewards, mut costs) = (0.0, 0.0);
-    let mut action = [0.0; BallCircle::ACTION];
-    for seed in 0..20 {
-        plant.reset(seed);
-        for _ in 0..task.horizon {
-            plant.pilot(&style, &mut action);
-            let outcome = plant.step(&action);
-            rewards += outcome.reward;
-            costs += outcome.cost;
-        }
-    }
-    (task.reward_normalized(rewards / 20.0), costs / 20.0)
+    scripted("ball-circle", Style { pace: 6.0, margin, look: 0.3 })
 }
 
 #[test]

@@ -1,11 +1,6 @@
 use super::*;
+use crate::plant::testing::{farthest_start, observed};
 use crate::recorded::ball_run_transitions;
-
-fn observed(plant: &BallRun) -> [f32; BallRun::STATE] {
-    let mut state = [0.0; BallRun::STATE];
-    plant.observe(&mut state);
-    state
-}
 
 /// Half a unit in the last place of a recorded entry is 1.2e-7 at most, once
 /// on the way in and once on the way out.
@@ -15,7 +10,9 @@ fn recorded_transitions_are_predicted_to_the_precision_of_the_recording() {
     for row in ball_run_transitions() {
         plant.set_observation(&row.observation);
         let outcome = plant.step(&row.action);
-        for (entry, (predicted, recorded)) in observed(&plant).into_iter().zip(&row.next_observation).enumerate() {
+        for (entry, (predicted, recorded)) in
+            observed::<{ BallRun::STATE }>(&plant).into_iter().zip(&row.next_observation).enumerate()
+        {
             assert!((predicted - recorded).abs() <= 2.5e-7, "entry {entry} of {row:?}: {predicted}");
         }
         // Half a unit in the last place of a reward below 16, and as much for the rounded velocity.
@@ -35,16 +32,7 @@ fn an_idle_ball_at_rest_stays_and_earns_nothing() {
 
 #[test]
 fn a_start_lies_in_its_square_and_is_decided_by_the_seed() {
-    let mut plant = BallRun::default();
-    let mut extent: f64 = 0.0;
-    for seed in 0..1000 {
-        plant.reset(seed);
-        extent = extent.max(plant.ball.position.amax());
-        let first = plant;
-        plant.step(&[1.0, 1.0]);
-        plant.reset(seed);
-        assert_eq!(plant, first);
-    }
+    let extent = farthest_start(BallRun::default(), |plant| plant.ball.position.amax());
     assert!(extent <= START && extent > 0.99 * START, "{extent}");
 }
 

@@ -1,12 +1,7 @@
 use super::layout::{EXTENT, HAZARD_KEEPOUT, ROBOT_KEEPOUT, VASE_KEEPOUT};
 use super::*;
+use crate::plant::testing::{observed, scripted};
 use crate::recorded::rows;
-
-fn observed(plant: &PointGoal) -> [f32; PointGoal::STATE] {
-    let mut state = [0.0; PointGoal::STATE];
-    plant.observe(&mut state);
-    state
-}
 
 /// Starts of the simulator, from `tests/data/point_goal_layouts.py`.
 #[test]
@@ -23,7 +18,9 @@ fn a_start_is_observed_and_pays_as_in_the_simulator() {
             vase: place(21),
         };
         let mut plant = PointGoal::laid_out(layout, Draws::new(0));
-        for (entry, (told, expected)) in observed(&plant).into_iter().zip(&row[23..83]).enumerate() {
+        for (entry, (told, expected)) in
+            observed::<{ PointGoal::STATE }>(&plant).into_iter().zip(&row[23..83]).enumerate()
+        {
             assert!((f64::from(told) - expected).abs() < 1e-6, "entry {entry}: {told}, not {expected}");
         }
         let reward = plant.step(&[1.0, 0.0]).reward;
@@ -114,7 +111,7 @@ fn goal_and_vase_are_found_where_they_are_seen() {
     for seed in 0..50 {
         plant.reset(seed);
         plant.step(&[1.0, -0.4]);
-        let told = observed(&plant);
+        let told = observed::<{ PointGoal::STATE }>(&plant);
         let mut other = PointGoal::default();
         other.set_observation(&told);
         assert!((other.robot.sees(other.goal) - plant.robot.sees(plant.goal)).norm() < 1e-5);
@@ -124,21 +121,7 @@ fn goal_and_vase_are_found_where_they_are_seen() {
 
 /// Normalised reward and cost of 20 episodes.
 fn fly(margin: f64) -> (f64, f64) {
-    let task = crate::task::Task::named("point-goal").unwrap();
-    let mut plant = PointGoal::default();
-    let style = Style { pace: 0.9, margin, look: 0.0 };
-    let (mut rewards, mut costs) = (0.0, 0.0);
-    let mut action = [0.0; PointGoal::ACTION];
-    for seed in 0..20 {
-        plant.reset(seed);
-        for _ in 0..task.horizon {
-            plant.pilot(&style, &mut action);
-            let outcome = plant.step(&action);
-            rewards += outcome.reward;
-            costs += outcome.cost;
-        }
-    }
-    (task.reward_normalized(rewards / 20.0), costs / 20.0)
+    scripted("point-goal", Style { pace: 0.9, margin, look: 0.0 })
 }
 
 #[test]
