@@ -5,7 +5,9 @@ each of them took, by its own clock. The sides take turns, round by round, so
 that a busy moment of the machine falls on all of them; the table has the median
 over all actions, and its ratio to the fastest of the others. All run on one
 thread, on the same network, state, budget and noise, and the action of each must
-be ours: within 1e-4 for the peers, and printed for the integers.
+be ours: within 1e-4 for the peers, and printed for the integers. That means
+something only where the last clip does not hide a difference, so the action must
+lie within its bounds, and the chain with one coefficient 1 % off must miss ours.
 
 The peers have what ours has: the state's and the budget's part of layer 1 is
 computed once an action, and the time embedding is a table. They are given the
@@ -15,6 +17,7 @@ usage: latency.py PROGRAMS IMAGES [--rounds 30] [--actions 30]
 """
 
 import argparse
+import copy
 import json
 import os
 import pathlib
@@ -24,10 +27,13 @@ import sys
 
 import onnx
 
+import latency_python
 import onnx_chain
 
 HERE = pathlib.Path(__file__).parent
 AGREEMENT = 1e-4
+# Coefficients of a step that are put 1 % off, one at a time.
+COEFFICIENTS = ("from_action", "from_noise", "to_x0", "to_action", "sigma")
 ONE_THREAD = {key: "1" for key in ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "RAYON_NUM_THREADS", "OPENBLAS_NUM_THREADS")}
 
 
@@ -52,6 +58,29 @@ class Side:
     def close(self):
         self.process.stdin.close()
         self.process.wait()
+
+
+def distance(action, other):
+    return max(abs(a - b) for a, b in zip(action, other, strict=True))
+
+
+def check_the_check(images, description, action):
+    """Ends the program where an error in the chain would pass for agreement."""
+    for entry, low, high in zip(action, description["action_low"], description["action_high"], strict=True):
+        if not low < entry < high:
+            sys.exit(f"our action {action} is clipped at the end, which hides differences; train the policies longer")
+    answer = lambda described: latency_python.onnxruntime_steps(images, described)().reshape(-1).tolist()
+    if not distance(answer(description), action) <= AGREEMENT:
+        sys.exit("onnxruntime does not compute the same, a call a step")
+    # The last two steps: the last has no noise, and its action is the estimate alone.
+    for coefficient in COEFFICIENTS:
+        step = -1 if coefficient in ("from_action", "from_noise", "to_x0") else -2
+        wrong = copy.deepcopy(description)
+        wrong["chain"][step][coefficient] *= 1.01
+        off = distance(answer(wrong), action)
+        print(f"with {coefficient} of step {len(wrong['chain']) + step + 1} 1 % off: {off:.1e} off ours", file=sys.stderr)
+        if off <= AGREEMENT:
+            sys.exit(f"a wrong {coefficient} would pass for agreement")
 
 
 def main():
@@ -94,8 +123,8 @@ def main():
         side.close()
 
     float_action = ours[0].action
-    off = {side.name: max(abs(a - b) for a, b in zip(side.action, float_action, strict=True))
-           for side in [*ours, *peers]}
+    check_the_check(images, description, float_action)
+    off = {side.name: distance(side.action, float_action) for side in [*ours, *peers]}
     for side in peers:
         if not off[side.name] <= AGREEMENT:
             sys.exit(f"{side.name} answers {side.action}, not {float_action}: it does not compute the same")

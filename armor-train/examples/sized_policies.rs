@@ -1,7 +1,8 @@
 //! Policies of the paper's largest size (state 60, action 2, hidden 256, 20
-//! steps) for `firmware-sim bench`: one in each precision and layout, hardly
-//! trained, for what an action takes does not depend on the weights. STATE and
-//! HIDDEN make it another size.
+//! steps) for `firmware-sim bench`: one in each precision and layout, without and
+//! with its critic. What an action takes does not depend on the weights, so they
+//! are trained only until actions lie within their bounds, where other runtimes
+//! can be compared (`bench/latency.py`). STATE and HIDDEN make it another size.
 //!
 //! ```text
 //! cargo run --release -p armor-train --example sized_policies -- FOLDER [STATE HIDDEN]
@@ -14,7 +15,7 @@ use armor_core::image::{Layout, PolicyImage, Precision};
 use armor_core::noise::Noise;
 use armor_train::config::Preset;
 use armor_train::data::{Dataset, Recording};
-use armor_train::export::export;
+use armor_train::export::{export, with_critic};
 use armor_train::quantize::quantize;
 use armor_train::run::{Checkpoint, Watch, Window, fit};
 
@@ -22,6 +23,9 @@ const ACTION: usize = 2;
 /// Rows of the synthetic recording, in episodes of 100.
 const ROWS: usize = 2000;
 const EPISODE: usize = 100;
+/// Steps of the training, and rows in each.
+const STEPS: u64 = 400;
+const BATCH: usize = 64;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -30,19 +34,25 @@ fn main() -> Result<(), Box<dyn Error>> {
     let (state, hidden) = (size(1, 60)?, size(2, 256)?);
     let data = Dataset::new(recording(state))?;
     let mut config = Preset::Paper.config("bench", 5.0);
-    (config.steps, config.batch, config.hidden) = (20, 64, hidden);
+    (config.steps, config.batch, config.hidden) = (STEPS, BATCH, hidden);
     let run = folder.join("run");
     fit(&config, &data, &run, false, &mut Unwatched)?;
-    let exported = export(&Checkpoint::read(&run)?, &data, None)?;
-    std::fs::write(folder.join("f32.armor"), exported.bytes.as_slice())?;
+    let checkpoint = Checkpoint::read(&run)?;
+    let exported = export(&checkpoint, &data, None)?;
     let float = PolicyImage::new_checked(exported.bytes.as_slice())?;
+    let write = |name: &str, bytes: &[u8]| -> Result<(), Box<dyn Error>> {
+        std::fs::write(folder.join(format!("{name}.armor")), bytes)?;
+        let critic = with_critic(&PolicyImage::new_checked(bytes)?, &checkpoint)?;
+        Ok(std::fs::write(folder.join(format!("{name}-critic.armor")), critic.as_slice())?)
+    };
+    write("f32", exported.bytes.as_slice())?;
     for (precision, layout, name) in [
-        (Precision::Int16x8, Layout::Rows, "int16x8.armor"),
-        (Precision::Int16x8, Layout::Paired, "int16x8-paired.armor"),
-        (Precision::Int8, Layout::Rows, "int8.armor"),
-        (Precision::Int8, Layout::Paired, "int8-paired.armor"),
+        (Precision::Int16x8, Layout::Rows, "int16x8"),
+        (Precision::Int16x8, Layout::Paired, "int16x8-paired"),
+        (Precision::Int8, Layout::Rows, "int8"),
+        (Precision::Int8, Layout::Paired, "int8-paired"),
     ] {
-        std::fs::write(folder.join(name), quantize(&float, &data, precision, layout)?.bytes.as_slice())?;
+        write(name, quantize(&float, &data, precision, layout)?.bytes.as_slice())?;
     }
     Ok(())
 }

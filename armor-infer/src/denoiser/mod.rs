@@ -7,7 +7,6 @@ mod float;
 mod integer;
 
 use armor_core::image::{Dense, Network};
-use armor_core::shape::MAX_ACTION;
 use armor_core::units::Cost;
 
 use crate::kernel::Kernel;
@@ -23,7 +22,7 @@ pub(crate) struct NotFinite;
 /// for `K` noisy actions at a time.
 pub(crate) enum Denoiser<const STATE: usize, const HIDDEN: usize, const K: usize> {
     Float(FloatDenoiser<STATE, HIDDEN, K>),
-    Integer(IntegerDenoiser<STATE, HIDDEN>),
+    Integer(IntegerDenoiser<STATE, HIDDEN, K>),
 }
 
 impl<const STATE: usize, const HIDDEN: usize, const K: usize> Denoiser<STATE, HIDDEN, K> {
@@ -80,21 +79,7 @@ impl<const STATE: usize, const HIDDEN: usize, const K: usize> Denoiser<STATE, HI
                 memory.eps(policy, network, n, action, eps);
             }
             (Self::Integer(memory), Network::Integer(network)) if cfg!(feature = "integer") => {
-                if K == 1 {
-                    return memory.eps(policy, network, n, action.as_flattened(), eps.as_flattened_mut());
-                }
-                // Integers take one action at a time.
-                let (mut alone, mut answer) = ([0.0; MAX_ACTION], [0.0; MAX_ACTION]);
-                let (alone, answer) = (front(&mut alone, action.len()), front(&mut answer, action.len()));
-                for column in 0..K {
-                    for (out, entry) in alone.iter_mut().zip(action.iter().filter_map(|entry| entry.get(column))) {
-                        *out = *entry;
-                    }
-                    memory.eps(policy, network, n, alone, answer);
-                    for (out, entry) in eps.iter_mut().filter_map(|entry| entry.get_mut(column)).zip(&*answer) {
-                        *out = *entry;
-                    }
-                }
+                memory.eps(policy, network, n, action, eps);
             }
             _ => {}
         }

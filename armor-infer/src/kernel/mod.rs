@@ -22,6 +22,8 @@ mod tests;
 use armor_core::fixed::SHORT_BITS;
 use armor_core::image::Layout;
 
+use crate::denoiser::front;
+
 /// The instructions that a policy's arithmetic runs on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kernel {
@@ -158,6 +160,22 @@ impl Kernel {
                 Layout::Paired => integer::sum_pairs(weights, codes, sums),
             },
         }
+    }
+
+    /// As [`Kernel::sum_rows`] for `K` columns of `inputs` codes and of `outputs`
+    /// sums, the weights read once for all.
+    pub(crate) fn sum_rows_columns<const H: usize, const K: usize>(
+        self,
+        (layout, weights): (Layout, &[i8]),
+        (codes, bits): (&[[i16; H]; K], u32),
+        sums: &mut [[i32; H]; K],
+        [inputs, outputs]: [usize; 2],
+    ) {
+        if K == 1 {
+            let codes = codes.as_flattened().get(..inputs).unwrap_or_default();
+            return self.sum_rows(layout, weights, codes, bits, front(sums.as_flattened_mut(), outputs));
+        }
+        columns::sum_rows(self, (layout, weights), (codes, bits), sums, [inputs, outputs]);
     }
 
     /// Sums over codes of `bits` become pre-activations

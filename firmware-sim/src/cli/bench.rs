@@ -13,8 +13,8 @@ use serde::Serialize;
 use super::boards;
 use super::output::{CommandResult, Output};
 use super::round_trip::{self, RoundTrips};
-use super::sampler_name;
-use crate::host::HostController;
+use super::{candidates, sampler_name};
+use crate::host::{HostController, Pilot, pilot};
 use crate::image_file::{ImageFile, NotAnImage};
 use crate::latency::{Latency, Quantiles};
 
@@ -36,9 +36,13 @@ pub(super) struct Bench {
     /// standard streams, on the longest rung of each image and on its shortest.
     #[arg(long)]
     link: bool,
+    /// Take the best of so many candidates for an action, on the fastest kernel;
+    /// several numbers stand side by side: 1,4,16. The images need a critic.
+    #[arg(long, value_name = "K", value_delimiter = ',', value_parser = candidates)]
+    best_of: Vec<u8>,
     /// What an action takes on a board, or on `all` of them, in place of this
     /// host: modelled, not measured.
-    #[arg(long, value_name = "B", value_parser = boards::boards, conflicts_with = "link")]
+    #[arg(long, value_name = "B", value_parser = boards::boards, conflicts_with_all = ["link", "best_of"])]
     board: Option<boards::Boards>,
 }
 
@@ -56,6 +60,7 @@ struct Row {
     image_bytes: usize,
     precision: Precision,
     kernel: &'static str,
+    candidates: u8,
     rung: usize,
     sampler: &'static str,
     steps: u16,
@@ -78,9 +83,13 @@ impl Bench {
         output.note(format_args!("timing {} actions of every rung on every kernel", ROUNDS * ACTIONS));
         let mut rows = Vec::new();
         for (path, image) in self.images.iter().zip(&images) {
-            for kernel in Kernel::available() {
-                let rungs = 0..image.manifest().rungs.len();
-                rows.extend(rungs.map(|rung| (image, kernel, Row::new(path, image, kernel, rung))));
+            let rungs = 0..image.manifest().rungs.len();
+            for kernel in Kernel::available().filter(|_| self.best_of.is_empty()) {
+                rows.extend(rungs.clone().map(|rung| (image, Some(kernel), Row::new(path, image, (kernel, 1), rung))));
+            }
+            for rung in rungs {
+                let row = |&candidates| (image, None, Row::new(path, image, (Kernel::best(), candidates), rung));
+                rows.extend(self.best_of.iter().map(row));
             }
         }
         for round in 0..ROUNDS {
@@ -100,7 +109,7 @@ impl Bench {
 }
 
 impl Row {
-    fn new(path: &Path, image: &PolicyImage<'_>, kernel: Kernel, rung: usize) -> Self {
+    fn new(path: &Path, image: &PolicyImage<'_>, (kernel, candidates): (Kernel, u8), rung: usize) -> Self {
         let manifest = image.manifest();
         let flown = manifest.rungs[rung];
         Self {
@@ -108,6 +117,7 @@ impl Row {
             image_bytes: image.bytes().len(),
             precision: manifest.precision,
             kernel: kernel.name(),
+            candidates,
             rung,
             sampler: sampler_name(flown.sampler),
             steps: flown.steps,
@@ -120,12 +130,14 @@ impl Row {
     }
 
     /// Times actions in states as the network was trained to see them, normal
-    /// after normalisation.
-    fn time(&mut self, image: &PolicyImage<'_>, kernel: Kernel, round: u64) -> Result<(), LoadError> {
+    /// after normalisation; on a kernel, or as a pilot of candidates flies.
+    fn time(&mut self, image: &PolicyImage<'_>, kernel: Option<Kernel>, round: u64) -> Result<(), LoadError> {
         let numbers = image.sections();
         let limit = CostLimit::from_cost(image.manifest().kappa.trained_max);
-        let policy = Policy::load(image)?.with_kernel(kernel);
-        let mut controller = HostController::new(policy, limit, round)?;
+        let mut controller: Box<dyn Pilot> = match kernel {
+            Some(kernel) => Box::new(HostController::new(Policy::load(image)?.with_kernel(kernel), limit, round)?),
+            None => pilot(image, limit, round, self.candidates)?,
+        };
         let mut state = vec![0.0; numbers.state_mean.len()];
         for tick in 0..WARM_UP + ACTIONS {
             Noise::new(round).fill_normal(0, tick, &mut state);
@@ -157,7 +169,7 @@ impl Row {
 
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "precision  kernel    rung  chain      MAC/action   median us      p99 us")?;
+        write!(f, "precision  kernel       best of rung  chain    MAC/action  median us     p99 us")?;
         let mut image = None;
         for row in &self.rungs {
             if image != Some(&row.image) {
@@ -168,8 +180,8 @@ impl fmt::Display for Report {
             let Quantiles { latency_us_p50, latency_us_p99, .. } = row.quantiles;
             write!(
                 f,
-                "\n  {precision:<9}{:<10}{:>4}  {chain:<9}{:>12}{latency_us_p50:>12.1}{latency_us_p99:>12.1}",
-                row.kernel, row.rung, row.macs_per_action
+                "\n  {precision:<9}{:<13}{:>7}{:>5}  {chain:<8}{:>11}{latency_us_p50:>11.1}{latency_us_p99:>11.1}",
+                row.kernel, row.candidates, row.rung, row.macs_per_action
             )?;
         }
         if !self.link.is_empty() {

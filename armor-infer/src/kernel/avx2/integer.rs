@@ -1,145 +1,21 @@
-//! AVX2, for 64-bit x86 processors that have it; found at run time.
-//!
-//! In single precision each lane is another output, and fused multiply-add
-//! stays off. Integers are exact, so their order is free; what must match is
-//! every rounding.
-#![allow(unsafe_code)]
+//! Fixed point: sums are exact in any order, and every rounding is the contract's.
 
 use core::arch::x86_64::*;
 
 use armor_core::fixed::{
-    LONG_BITS, LOWEST_ACTIVATION, MAX_TERMS, MISH_RESIDUAL, PRE_MAX, SHORT_BITS, TABLE_END, TABLE_START,
-    TABLE_STEP_BITS, WIDEN_BITS,
+    LONG_BITS, LOWEST_ACTIVATION, MAX_TERMS, MISH_RESIDUAL, PRE_MAX, TABLE_END, TABLE_START, TABLE_STEP_BITS,
+    WIDEN_BITS,
 };
 
-use super::{columns, float, integer};
 use crate::denoiser::front;
+use crate::kernel::integer;
 
-/// Single-precision numbers in a register.
-const LANES: usize = 8;
-/// Registers of single-precision sums, as many as keep the adders busy.
-const WIDE: usize = 8;
-/// Rows of weights that are fetched ahead: a block reads a part of each row,
-/// and the processor does not foresee such steps by itself.
-const AHEAD: usize = 8;
 /// Rows whose sums are taken side by side.
 const ROWS: usize = 4;
 
-/// The proof that this processor has AVX2.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Avx2(());
-
-impl Avx2 {
-    pub(super) fn detect() -> Option<Self> {
-        std::arch::is_x86_feature_detected!("avx2").then_some(Self(()))
-    }
-
-    pub(super) fn accumulate(self, weights: &[f32], x: &[f32], out: &mut [f32]) {
-        // SAFETY: `self` is the proof that the processor has AVX2.
-        unsafe { accumulate(weights, x, out) }
-    }
-
-    pub(super) fn accumulate_columns<const K: usize>(self, weights: &[f32], x: &[[f32; K]], out: &mut [[f32; K]]) {
-        // SAFETY: as above.
-        unsafe { accumulate_columns(weights, x, out) }
-    }
-
-    pub(super) fn mish(self, values: &mut [f32]) {
-        // SAFETY: as above.
-        unsafe { mish(values) }
-    }
-
-    pub(super) fn sum_rows(self, weights: &[i8], codes: &[i16], bits: u32, sums: &mut [i32]) {
-        // SAFETY: as above.
-        unsafe {
-            if bits == SHORT_BITS {
-                sum_rows_short(weights, codes, sums);
-            } else {
-                sum_rows_long(weights, codes, sums);
-            }
-        }
-    }
-
-    pub(super) fn rescale(self, sums: &mut [i32], bits: u32, multiplier: &[i32], factor: i32, bias: &[i32]) {
-        // SAFETY: as above.
-        unsafe { rescale(sums, bits, multiplier, factor, bias) }
-    }
-
-    pub(super) fn activate(self, pre: &[i32], factor: i32, bits: u32, codes: &mut [i16]) {
-        // SAFETY: as above.
-        unsafe { activate(pre, factor, bits, codes) }
-    }
-}
-
-#[target_feature(enable = "avx2")]
-fn accumulate(weights: &[f32], x: &[f32], out: &mut [f32]) {
-    let stride = out.len().max(1);
-    let (weights, out) = blocks::<WIDE>(weights, stride, x, out);
-    let (weights, out) = blocks::<1>(weights, stride, x, out);
-    float::accumulate_rest(weights, stride, x, out);
-}
-
-/// Works on `out` in blocks of `V` registers; returns the outputs left over,
-/// and the weights from their first column on.
-///
-/// Plain loops would do, but for the compiler: it keeps the sums of more than a
-/// few outputs in memory, and loads and stores them for every input.
-#[target_feature(enable = "avx2")]
-fn blocks<'w, 'o, const V: usize>(
-    mut weights: &'w [f32],
-    stride: usize,
-    x: &[f32],
-    out: &'o mut [f32],
-) -> (&'w [f32], &'o mut [f32]) {
-    let (whole, rest) = out.split_at_mut(out.len() - out.len() % (V * LANES));
-    for block in whole.as_chunks_mut::<LANES>().0.as_chunks_mut::<V>().0 {
-        let mut sums = [_mm256_setzero_ps(); V];
-        for (sum, lanes) in sums.iter_mut().zip(&*block) {
-            *sum = load(lanes);
-        }
-        let rows = weights.chunks(stride).filter_map(|row| row.as_chunks::<LANES>().0.first_chunk::<V>());
-        for (x, row) in x.iter().zip(rows) {
-            let x = _mm256_set1_ps(*x);
-            for (sum, lanes) in sums.iter_mut().zip(row) {
-                *sum = _mm256_add_ps(*sum, _mm256_mul_ps(x, load(lanes)));
-            }
-            for line in row.chunks_exact(2) {
-                let ahead = line.as_ptr().cast::<f32>().wrapping_add(AHEAD * stride);
-                // SAFETY: a hint, whatever the address; newer compilers ask for no `unsafe`.
-                #[allow(unused_unsafe)]
-                unsafe {
-                    _mm_prefetch::<_MM_HINT_T0>(ahead.cast())
-                };
-            }
-        }
-        for (lanes, sum) in block.iter_mut().zip(&sums) {
-            // SAFETY: 32 bytes, and no alignment is needed.
-            unsafe { _mm256_storeu_ps(lanes.as_mut_ptr(), *sum) };
-        }
-        weights = weights.get(V * LANES..).unwrap_or_default();
-    }
-    (weights, rest)
-}
-
-#[target_feature(enable = "avx2")]
-fn load(lanes: &[f32; LANES]) -> __m256 {
-    // SAFETY: 32 bytes, and no alignment is needed.
-    unsafe { _mm256_loadu_ps(lanes.as_ptr()) }
-}
-
-#[target_feature(enable = "avx2")]
-fn accumulate_columns<const K: usize>(weights: &[f32], x: &[[f32; K]], out: &mut [[f32; K]]) {
-    columns::accumulate(weights, x, out);
-}
-
-#[target_feature(enable = "avx2")]
-fn mish(values: &mut [f32]) {
-    float::mish(values);
-}
-
 /// Codes of 7 bits, 32 at a time: two products fit 16 bits, so VPMADDUBSW never saturates.
 #[target_feature(enable = "avx2")]
-fn sum_rows_short(weights: &[i8], codes: &[i16], sums: &mut [i32]) {
+pub(super) fn sum_rows_short(weights: &[i8], codes: &[i16], sums: &mut [i32]) {
     let mut bytes = [0; MAX_TERMS];
     let Some(bytes) = bytes.get_mut(..codes.len()) else { return integer::sum_rows(weights, codes, sums) };
     for (byte, code) in bytes.iter_mut().zip(codes) {
@@ -158,7 +34,7 @@ fn sum_rows_short(weights: &[i8], codes: &[i16], sums: &mut [i32]) {
 
 /// Codes of 15 bits and a sign, 16 at a time.
 #[target_feature(enable = "avx2")]
-fn sum_rows_long(weights: &[i8], codes: &[i16], sums: &mut [i32]) {
+pub(super) fn sum_rows_long(weights: &[i8], codes: &[i16], sums: &mut [i32]) {
     let (chunks, _) = codes.as_chunks::<16>();
     let add = |sum, weights: &[i8; 16], codes: &[i16; 16]| {
         // SAFETY: 16 and 32 bytes, and neither needs an alignment.
@@ -217,7 +93,7 @@ fn mul_round(a: __m256i, b: __m256i) -> __m256i {
 }
 
 #[target_feature(enable = "avx2")]
-fn rescale(sums: &mut [i32], bits: u32, multiplier: &[i32], factor: i32, bias: &[i32]) {
+pub(super) fn rescale(sums: &mut [i32], bits: u32, multiplier: &[i32], factor: i32, bias: &[i32]) {
     let align = _mm_cvtsi32_si128((LONG_BITS - bits) as i32);
     let (blocks, rest) = sums.as_chunks_mut::<8>();
     let done = 8 * blocks.len();
@@ -237,7 +113,7 @@ fn rescale(sums: &mut [i32], bits: u32, multiplier: &[i32], factor: i32, bias: &
 }
 
 #[target_feature(enable = "avx2")]
-fn activate(pre: &[i32], factor: i32, bits: u32, codes: &mut [i16]) {
+pub(super) fn activate(pre: &[i32], factor: i32, bits: u32, codes: &mut [i16]) {
     let (blocks, rest) = codes.as_chunks_mut::<8>();
     let (whole, pre_rest) = pre.as_chunks::<8>();
     for (block, pre) in blocks.iter_mut().zip(whole) {

@@ -1,154 +1,23 @@
-//! AVX-512 (F, BW, DQ, VL), for 64-bit x86 processors that have it; found at
-//! run time, with VNNI where that is there as well.
-//!
-//! As in `avx2.rs`, a lane is another output in single precision, and what
-//! integers must match is every rounding.
-#![allow(unsafe_code)]
+//! Fixed point: sums are exact in any order, and every rounding is the contract's.
 
 use core::arch::x86_64::*;
 
 use armor_core::fixed::{
-    LONG_BITS, LOWEST_ACTIVATION, MAX_TERMS, MISH_RESIDUAL, PRE_MAX, SHORT_BITS, TABLE_END, TABLE_START,
-    TABLE_STEP_BITS, WIDEN_BITS,
+    LONG_BITS, LOWEST_ACTIVATION, MAX_TERMS, MISH_RESIDUAL, PRE_MAX, TABLE_END, TABLE_START, TABLE_STEP_BITS,
+    WIDEN_BITS,
 };
 
-use super::avx2::Avx2;
-use super::{columns, float, integer};
 use crate::denoiser::front;
+use crate::kernel::integer;
 
-/// Single-precision numbers in a register.
+/// Integers of 32 bits in a register.
 const LANES: usize = 16;
-/// Registers of single-precision sums: 256 outputs, so that the weights of the
-/// usual network are read once, from front to back, as fast as L2 delivers them.
-const WIDE: usize = 16;
-/// Registers of sums for what is left of the outputs.
-const NARROW: usize = 4;
-/// Rows whose integer sums are taken side by side.
+/// Rows whose sums are taken side by side.
 const ROWS: usize = 8;
-
-/// The proof that this processor has AVX-512.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Avx512 {
-    /// Sums of integer products, where there is no VNNI.
-    avx2: Avx2,
-    vnni: bool,
-}
-
-impl Avx512 {
-    /// The kernel without and with VNNI, as far as this processor has them.
-    pub(super) fn detect() -> impl Iterator<Item = Self> {
-        let has = std::arch::is_x86_feature_detected!("avx512f")
-            && std::arch::is_x86_feature_detected!("avx512bw")
-            && std::arch::is_x86_feature_detected!("avx512dq")
-            && std::arch::is_x86_feature_detected!("avx512vl");
-        let plain = Avx2::detect().filter(|_| has).map(|avx2| Self { avx2, vnni: false });
-        let vnni = std::arch::is_x86_feature_detected!("avx512vnni");
-        plain.into_iter().chain(plain.filter(|_| vnni).map(|plain| Self { vnni: true, ..plain }))
-    }
-
-    pub(super) const fn name(self) -> &'static str {
-        if self.vnni { "avx512-vnni" } else { "avx512" }
-    }
-
-    pub(super) fn accumulate(self, weights: &[f32], x: &[f32], out: &mut [f32]) {
-        // SAFETY: `self` is the proof that the processor has AVX-512.
-        unsafe { accumulate(weights, x, out) }
-    }
-
-    pub(super) fn accumulate_columns<const K: usize>(self, weights: &[f32], x: &[[f32; K]], out: &mut [[f32; K]]) {
-        // SAFETY: as above.
-        unsafe { accumulate_columns(weights, x, out) }
-    }
-
-    pub(super) fn mish(self, values: &mut [f32]) {
-        // SAFETY: as above.
-        unsafe { mish(values) }
-    }
-
-    pub(super) fn sum_rows(self, weights: &[i8], codes: &[i16], bits: u32, sums: &mut [i32]) {
-        if !self.vnni {
-            return self.avx2.sum_rows(weights, codes, bits, sums);
-        }
-        // SAFETY: as above, and the processor has VNNI.
-        unsafe {
-            if bits == SHORT_BITS {
-                sum_rows_short(weights, codes, sums);
-            } else {
-                sum_rows_long(weights, codes, sums);
-            }
-        }
-    }
-
-    pub(super) fn rescale(self, sums: &mut [i32], bits: u32, multiplier: &[i32], factor: i32, bias: &[i32]) {
-        // SAFETY: as above.
-        unsafe { rescale(sums, bits, multiplier, factor, bias) }
-    }
-
-    pub(super) fn activate(self, pre: &[i32], factor: i32, bits: u32, codes: &mut [i16]) {
-        // SAFETY: as above.
-        unsafe { activate(pre, factor, bits, codes) }
-    }
-}
-
-#[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl")]
-fn accumulate(weights: &[f32], x: &[f32], out: &mut [f32]) {
-    let stride = out.len().max(1);
-    let (weights, out) = blocks::<WIDE>(weights, stride, x, out);
-    let (weights, out) = blocks::<NARROW>(weights, stride, x, out);
-    let (weights, out) = blocks::<1>(weights, stride, x, out);
-    float::accumulate_rest(weights, stride, x, out);
-}
-
-/// Works on `out` in blocks of `V` registers; returns the outputs left over,
-/// and the weights from their first column on.
-#[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl")]
-fn blocks<'w, 'o, const V: usize>(
-    mut weights: &'w [f32],
-    stride: usize,
-    x: &[f32],
-    out: &'o mut [f32],
-) -> (&'w [f32], &'o mut [f32]) {
-    let (whole, rest) = out.split_at_mut(out.len() - out.len() % (V * LANES));
-    for block in whole.as_chunks_mut::<LANES>().0.as_chunks_mut::<V>().0 {
-        let mut sums = [_mm512_setzero_ps(); V];
-        for (sum, lanes) in sums.iter_mut().zip(&*block) {
-            *sum = load(lanes);
-        }
-        let rows = weights.chunks(stride).filter_map(|row| row.as_chunks::<LANES>().0.first_chunk::<V>());
-        for (x, row) in x.iter().zip(rows) {
-            let x = _mm512_set1_ps(*x);
-            for (sum, lanes) in sums.iter_mut().zip(row) {
-                *sum = _mm512_add_ps(*sum, _mm512_mul_ps(x, load(lanes)));
-            }
-        }
-        for (lanes, sum) in block.iter_mut().zip(&sums) {
-            // SAFETY: 64 bytes, and no alignment is needed.
-            unsafe { _mm512_storeu_ps(lanes.as_mut_ptr(), *sum) };
-        }
-        weights = weights.get(V * LANES..).unwrap_or_default();
-    }
-    (weights, rest)
-}
-
-#[target_feature(enable = "avx512f")]
-fn load(lanes: &[f32; LANES]) -> __m512 {
-    // SAFETY: 64 bytes, and no alignment is needed.
-    unsafe { _mm512_loadu_ps(lanes.as_ptr()) }
-}
-
-#[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl")]
-fn accumulate_columns<const K: usize>(weights: &[f32], x: &[[f32; K]], out: &mut [[f32; K]]) {
-    columns::accumulate(weights, x, out);
-}
-
-#[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl")]
-fn mish(values: &mut [f32]) {
-    float::mish(values);
-}
 
 /// Codes of 7 bits, 64 at a time.
 #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,avx512vnni")]
-fn sum_rows_short(weights: &[i8], codes: &[i16], sums: &mut [i32]) {
+pub(super) fn sum_rows_short(weights: &[i8], codes: &[i16], sums: &mut [i32]) {
     let mut bytes = [0; MAX_TERMS];
     let Some(front) = bytes.get_mut(..codes.len()) else { return integer::sum_rows(weights, codes, sums) };
     for (byte, code) in front.iter_mut().zip(codes) {
@@ -165,7 +34,7 @@ fn sum_rows_short(weights: &[i8], codes: &[i16], sums: &mut [i32]) {
 
 /// Codes of 15 bits and a sign, 32 at a time.
 #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,avx512vnni")]
-fn sum_rows_long(weights: &[i8], codes: &[i16], sums: &mut [i32]) {
+pub(super) fn sum_rows_long(weights: &[i8], codes: &[i16], sums: &mut [i32]) {
     let mut words = [0; MAX_TERMS];
     let Some(front) = words.get_mut(..codes.len()) else { return integer::sum_rows(weights, codes, sums) };
     front.copy_from_slice(codes);
@@ -255,7 +124,7 @@ fn mul_round(a: __m512i, b: __m512i) -> __m512i {
 }
 
 #[target_feature(enable = "avx512f")]
-fn rescale(sums: &mut [i32], bits: u32, multiplier: &[i32], factor: i32, bias: &[i32]) {
+pub(super) fn rescale(sums: &mut [i32], bits: u32, multiplier: &[i32], factor: i32, bias: &[i32]) {
     let align = _mm_cvtsi32_si128((LONG_BITS - bits) as i32);
     let (blocks, rest) = sums.as_chunks_mut::<LANES>();
     let done = LANES * blocks.len();
@@ -275,7 +144,7 @@ fn rescale(sums: &mut [i32], bits: u32, multiplier: &[i32], factor: i32, bias: &
 }
 
 #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl")]
-fn activate(pre: &[i32], factor: i32, bits: u32, codes: &mut [i16]) {
+pub(super) fn activate(pre: &[i32], factor: i32, bits: u32, codes: &mut [i16]) {
     let (blocks, rest) = codes.as_chunks_mut::<LANES>();
     let (whole, pre_rest) = pre.as_chunks::<LANES>();
     for (block, pre) in blocks.iter_mut().zip(whole) {
