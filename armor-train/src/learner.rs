@@ -1,5 +1,7 @@
 //! The algorithm: one training step of ARMOR, top to bottom.
 
+use std::sync::Arc;
+
 use armor_core::noise::{Noise, below, uniform};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -114,7 +116,9 @@ impl<'d, T: Scalar> Learner<'d, T> {
     pub fn resume(config: Config, data: &'d Dataset, state: LearnerState<T>) -> Self {
         let model = Model::new(&config, data.state_dim(), data.action_dim());
         let shares = (0..config.batch).step_by(SHARE);
-        let workers = shares.map(|first| Worker::new(&model, first, SHARE.min(config.batch - first))).collect();
+        let chains = Arc::default();
+        let worker = |first| Worker::new(&model, first, SHARE.min(config.batch - first), Arc::clone(&chains));
+        let workers = shares.map(worker).collect();
         let mut reweighting = Reweighting::new(&config, data);
         if reweighting.refreshes(state.step) > 0 {
             reweighting.restore(data, &state.counterfactual, state.counterfactual_active);

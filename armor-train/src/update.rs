@@ -4,10 +4,13 @@
 //! threads, and gradients are added in the order of the workers: results do not
 //! depend on the number of threads.
 
+use std::sync::Arc;
+
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use crate::actor::chain::{Chain, Draw};
+use crate::actor::chains::Chains;
 use crate::actor::denoiser::Context;
 use crate::actor::{ActorLoss, ActorNoise, ActorTape, Judges};
 use crate::batch::Batch;
@@ -59,8 +62,8 @@ pub struct CriticMetrics {
 }
 
 impl<T: Scalar> Worker<T> {
-    /// Room for a share of `samples` samples from place `first` on.
-    pub fn new(model: &Model, first: usize, samples: usize) -> Self {
+    /// Room for a share of `samples` samples from place `first` on, and `chains` that all shares have in common.
+    pub fn new(model: &Model, first: usize, samples: usize, chains: Arc<Chains<T>>) -> Self {
         let denoiser = &model.actor.denoiser;
         let (state, action) = (denoiser.widths().state, denoiser.widths().action);
         Self {
@@ -78,7 +81,7 @@ impl<T: Scalar> Worker<T> {
             critic_gradient: vec![T::zero(); model.critic.size()],
             trunk_gradients: [(); 3].map(|()| vec![T::zero(); model.critic.trunk_size()]),
             critic_losses: [0.0; 3],
-            actor_tape: model.actor.tape(&model.critic, &model.dual, samples),
+            actor_tape: model.actor.tape(&model.critic, &model.dual, samples, chains),
             actor_gradient: vec![T::zero(); denoiser.size()],
             dual_gradient: vec![T::zero(); model.dual.size()],
             actor_loss: ActorLoss::default(),
@@ -270,11 +273,19 @@ pub fn update_actor<T: Scalar>(
 ) -> (ActorLoss, [Vec<T>; 2]) {
     let batch_len = workers.iter().map(|worker| worker.batch.samples()).sum();
     let shared = &*parameters;
-    workers.par_iter_mut().for_each(|worker| worker.act(model, shared, batch_len, draw));
+    let constant = model.actor.guidance.constant(model.actor.eta);
+    workers.par_iter_mut().for_each(|worker| {
+        worker.act(model, shared, batch_len, draw);
+        if let Some(guidance) = constant {
+            worker.improve(model, shared, batch_len, guidance);
+        }
+    });
     let loss = workers.iter().fold(ActorLoss::default(), |sum, worker| sum + worker.actor_loss);
     let loss = loss * (1.0 / batch_len as f64);
-    let guidance = model.actor.guidance.factor(model.actor.eta, loss.reward_size);
-    workers.par_iter_mut().for_each(|worker| worker.improve(model, shared, batch_len, guidance));
+    if constant.is_none() {
+        let guidance = model.actor.guidance.factor(model.actor.eta, loss.reward_size);
+        workers.par_iter_mut().for_each(|worker| worker.improve(model, shared, batch_len, guidance));
+    }
 
     let mut gradient = vec![T::zero(); parameters.actor.len()];
     let mut dual_gradient: Vec<T> = parameters.dual.iter().map(|&p| T::of(2.0 * model.dual_decay) * p).collect();

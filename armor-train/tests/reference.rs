@@ -121,7 +121,7 @@ impl Reference {
     fn workers(&self, model: &Model, shares: &[usize]) -> Vec<Worker<f64>> {
         let mut first = 0;
         let workers = shares.iter().map(|&samples| {
-            let mut worker = Worker::new(model, first, samples);
+            let mut worker = Worker::new(model, first, samples, Default::default());
             let columns = |key, rows| self.matrix(key, rows).columns(first, samples).into_owned();
             let entries = |key| self.numbers(key)[first..first + samples].to_vec();
             worker.batch.state = columns("s", STATE);

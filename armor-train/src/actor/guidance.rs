@@ -17,6 +17,14 @@ pub enum Guidance {
 const NO_SCALE: f64 = 1e-6;
 
 impl Guidance {
+    /// The factor on `Q_r`, where it does not depend on the batch.
+    pub const fn constant(self, eta: f64) -> Option<f64> {
+        match self {
+            Self::Raw => Some(eta),
+            Self::Normalized => None,
+        }
+    }
+
     /// The factor on `Q_r` that stands for `eta`, where the batch has `mean |Q_r| = size`.
     pub fn factor(self, eta: f64, size: f64) -> f64 {
         match self {

@@ -6,9 +6,12 @@
 //! ```
 
 pub mod chain;
+pub mod chains;
 pub mod denoiser;
 mod guidance;
 mod process;
+
+use std::sync::Arc;
 
 use armor_core::schedule::Sampler;
 use nalgebra::DMatrix;
@@ -19,6 +22,7 @@ use crate::critic::{Critic, CriticTape, Pick, Task, Twins};
 use crate::dual::{Dual, DualTape};
 use crate::nn::Scalar;
 use chain::{Chain, Draw, clip, coefficients};
+use chains::Chains;
 use denoiser::{Call, Context, Denoiser};
 
 pub use guidance::{CloningNorm, Guidance};
@@ -64,7 +68,9 @@ pub struct Actor {
 pub struct ActorTape<T: Scalar> {
     context: Context<T>,
     call: Call<T>,
-    chain: Chain<T>,
+    /// Lent from the forward to the backward pass.
+    chain: Option<Chain<T>>,
+    chains: Arc<Chains<T>>,
     /// Whether the one-step estimate lay within the bounds, `A x B`.
     inside: DMatrix<T>,
     critic: CriticTape<T>,
@@ -151,8 +157,8 @@ impl<T: Scalar> ActorTape<T> {
 }
 
 impl Actor {
-    /// Room for updates on `samples` columns.
-    pub fn tape<T: Scalar>(&self, critic: &Critic, dual: &Dual, samples: usize) -> ActorTape<T> {
+    /// Room for the policy's chain on `samples` columns.
+    fn chain<T: Scalar>(&self, samples: usize) -> Chain<T> {
         let steps: Vec<_> = match self.policy_gradient {
             PolicyGradient::Full | PolicyGradient::LastK => {
                 self.process.chain(Sampler::Ddpm, self.process.schedule.steps)
@@ -163,11 +169,23 @@ impl Actor {
             PolicyGradient::LastK => self.gradient_steps,
             PolicyGradient::Full | PolicyGradient::OneStep => steps.len(),
         };
+        Chain::new(&self.denoiser, steps, samples, gradient_steps)
+    }
+
+    /// Room for updates on `samples` columns, with the room of their chains from `chains`.
+    pub fn tape<T: Scalar>(
+        &self,
+        critic: &Critic,
+        dual: &Dual,
+        samples: usize,
+        chains: Arc<Chains<T>>,
+    ) -> ActorTape<T> {
         let action = || DMatrix::zeros(self.denoiser.widths().action, samples);
         ActorTape {
             context: self.denoiser.context(samples),
             call: self.denoiser.call(samples),
-            chain: Chain::new(&self.denoiser, steps, samples, gradient_steps),
+            chain: None,
+            chains,
             inside: action(),
             critic: critic.tape(samples),
             pick: Pick::PESSIMISTIC,
@@ -307,8 +325,10 @@ impl Actor {
     fn sample<T: Scalar>(&self, parameters: &[T], noise: &ActorNoise<'_, T>, tape: &mut ActorTape<T>) {
         match self.policy_gradient {
             PolicyGradient::Full | PolicyGradient::LastK => {
-                tape.chain.run(&self.denoiser, parameters, &tape.context, noise.chain);
-                tape.action.copy_from(&tape.chain.action);
+                let lent = || tape.chains.lend(tape.action.ncols(), || self.chain(tape.action.ncols()));
+                let chain = tape.chain.get_or_insert_with(lent);
+                chain.run(&self.denoiser, parameters, &tape.context, noise.chain);
+                tape.action.copy_from(&chain.action);
             }
             PolicyGradient::OneStep => {
                 for (sample, &level) in noise.levels.iter().enumerate() {
@@ -325,10 +345,13 @@ impl Actor {
 
     /// Carries the critics' gradient at `a_pi` back to the network.
     fn improve<T: Scalar>(&self, parameters: &[T], tape: &mut ActorTape<T>, gradient: &mut [T]) {
-        let ActorTape { context, call, chain, inside, action_gradient, .. } = tape;
+        let ActorTape { context, call, chain, chains, inside, action_gradient, .. } = tape;
         match self.policy_gradient {
             PolicyGradient::Full | PolicyGradient::LastK => {
-                chain.backward(&self.denoiser, parameters, context, action_gradient, gradient);
+                if let Some(mut chain) = chain.take() {
+                    chain.backward(&self.denoiser, parameters, context, action_gradient, gradient);
+                    chains.give_back(chain);
+                }
             }
             PolicyGradient::OneStep => {
                 for sample in 0..inside.ncols() {

@@ -1,5 +1,7 @@
 //! Gradients of the whole actor by finite differences, in f64.
 
+use std::sync::Arc;
+
 use armor_core::schedule::{Sampler, Schedule};
 use nalgebra::DMatrix;
 
@@ -84,7 +86,7 @@ fn draw(stage: usize, sample: usize, out: &mut [f64]) {
 
 impl Fixture {
     fn backward(&self, parameters: &[f64]) -> (ActorLoss, Vec<f64>, ActorTape<f64>) {
-        let mut tape = self.actor.tape(&self.critic, &self.dual, SAMPLES);
+        let mut tape = self.actor.tape(&self.critic, &self.dual, SAMPLES, Arc::default());
         let mut gradient = vec![0.0; parameters.len()];
         let mut dual_gradient = vec![0.0; self.dual_parameters.len()];
         let judges =

@@ -148,32 +148,31 @@ impl Reweighting {
         looked_at: &[u32],
         rows: usize,
     ) -> Vec<f32> {
-        let mut ascending = looked_at.to_vec();
-        ascending.sort_unstable();
-        let mut found = vec![0.0; ascending.len()];
-        ascending.par_chunks(SHARE).zip(found.par_chunks_mut(SHARE)).for_each(|(share, found)| {
+        let mut wanted = vec![false; rows];
+        looked_at.iter().for_each(|&row| wanted[row as usize] = true);
+        let mut margins = vec![0.0; rows];
+        let shares = wanted.par_chunks(SHARE).zip(margins.par_chunks_mut(SHARE)).enumerate();
+        shares.for_each(|(index, (wanted, margins))| {
+            let share = (index * SHARE..).zip(wanted).filter(|(_, wanted)| **wanted).map(|(row, _)| row);
+            let share: Vec<usize> = share.collect();
             let mut batch: Batch<T> = source.room(share.len());
             for (sample, &row) in share.iter().enumerate() {
-                source.fill(&mut batch, sample, row as usize, 0.0);
+                source.fill(&mut batch, sample, row, 0.0);
             }
-            let bound = share.iter().map(|&row| T::of(self.bounds.bound(source.data(), row as usize)));
+            let bound = share.iter().map(|&row| T::of(self.bounds.bound(source.data(), row)));
             let bound: Vec<T> = bound.collect();
             let draw = |k: usize, sample: usize, out: &mut [T]| {
-                let tick = step * rows as u64 + u64::from(share[sample]);
+                let tick = step * rows as u64 + share[sample] as u64;
                 stream::fill_normal(noise, stream::PERTURBATION + k as u32, tick, out);
             };
             let inputs = (&batch.state, &batch.kappa[..], &batch.action);
             let mut tape = critic.0.tape(share.len());
             let mut margin = vec![T::zero(); share.len()];
             self.counterfactual.margins(critic, inputs, &bound, &draw, &mut tape, &mut margin);
-            for (found, margin) in found.iter_mut().zip(margin) {
-                *found = margin.to_f64() as f32;
+            for (row, margin) in share.into_iter().zip(margin) {
+                margins[row % SHARE] = margin.to_f64() as f32;
             }
         });
-        let mut margins = vec![0.0; rows];
-        for (row, margin) in ascending.into_iter().zip(found) {
-            margins[row as usize] = margin;
-        }
         margins
     }
 }

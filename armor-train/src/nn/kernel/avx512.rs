@@ -13,6 +13,11 @@ use crate::nn::product::{Operand, Update};
 /// Panels of a tile.
 const PANELS: usize = 2;
 
+/// What becomes of a sum on its way to the result; known when a tile is compiled.
+const REPLACE: u8 = 0;
+const PLUS: u8 = 1;
+const TIMES: u8 = 2;
+
 /// The proof that this processor has AVX-512.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Avx512(());
@@ -65,6 +70,14 @@ struct Left<'a> {
     panel: usize,
 }
 
+/// Where the sums go, column by column, and what they are joined with on their way.
+#[derive(Clone, Copy)]
+struct Target {
+    out: *mut f32,
+    /// As large as the result, and perhaps the result itself.
+    other: *const f32,
+}
+
 /// # Safety
 /// All numbers that `left` describes lie within its values.
 #[target_feature(enable = "avx512f")]
@@ -74,13 +87,29 @@ unsafe fn multiply(out: &mut [f32], left: Left<'_>, b: Operand<'_, f32>, update:
     if let Update::Plus(other) | Update::Times(other) = update {
         assert_eq!(other.len(), out.len(), "the other matrix is as large as the result");
     }
+    let out = out.as_mut_ptr();
+    // SAFETY: the result and the other matrix have as many values as was asserted.
+    unsafe {
+        match update {
+            Update::Replace => strips::<REPLACE>(Target { out, other: out }, left, b),
+            Update::Add => strips::<PLUS>(Target { out, other: out }, left, b),
+            Update::Plus(other) => strips::<PLUS>(Target { out, other: other.as_ptr() }, left, b),
+            Update::Times(other) => strips::<TIMES>(Target { out, other: other.as_ptr() }, left, b),
+        }
+    }
+}
+
+/// # Safety
+/// As [`multiply`]; the target is as high as the left factor and as wide as `b`.
+#[target_feature(enable = "avx512f")]
+unsafe fn strips<const UPDATE: u8>(target: Target, left: Left<'_>, b: Operand<'_, f32>) {
     for first in (0..left.rows).step_by(PANELS * ROWS) {
         // SAFETY: `first` is a row, and where there is more than a panel below it, a second panel.
         unsafe {
             if left.rows - first > ROWS {
-                strip::<PANELS>(out, left, first, b, update);
+                strip::<UPDATE, PANELS>(target, left, first, b);
             } else {
-                strip::<1>(out, left, first, b, update);
+                strip::<UPDATE, 1>(target, left, first, b);
             }
         }
     }
@@ -89,22 +118,16 @@ unsafe fn multiply(out: &mut [f32], left: Left<'_>, b: Operand<'_, f32>, update:
 /// All columns of the panels from row `first` on.
 ///
 /// # Safety
-/// As [`multiply`]; `P` panels begin at `first` or below it, and `out` and `b` fit.
+/// As [`strips`]; `P` panels begin at `first` or below it.
 #[target_feature(enable = "avx512f")]
-unsafe fn strip<const P: usize>(
-    out: &mut [f32],
-    left: Left<'_>,
-    first: usize,
-    b: Operand<'_, f32>,
-    update: Update<'_, f32>,
-) {
+unsafe fn strip<const UPDATE: u8, const P: usize>(target: Target, left: Left<'_>, first: usize, b: Operand<'_, f32>) {
     // SAFETY: handed on.
     unsafe {
-        let at = tiles::<P, 12>(out, left, first, b, update, 0);
-        let at = tiles::<P, 8>(out, left, first, b, update, at);
-        let at = tiles::<P, 4>(out, left, first, b, update, at);
-        let at = tiles::<P, 2>(out, left, first, b, update, at);
-        tiles::<P, 1>(out, left, first, b, update, at);
+        let at = tiles::<UPDATE, P, 12>(target, left, first, b, 0);
+        let at = tiles::<UPDATE, P, 8>(target, left, first, b, at);
+        let at = tiles::<UPDATE, P, 4>(target, left, first, b, at);
+        let at = tiles::<UPDATE, P, 2>(target, left, first, b, at);
+        tiles::<UPDATE, P, 1>(target, left, first, b, at);
     }
 }
 
@@ -113,12 +136,11 @@ unsafe fn strip<const P: usize>(
 /// # Safety
 /// As [`strip`].
 #[target_feature(enable = "avx512f")]
-unsafe fn tiles<const P: usize, const C: usize>(
-    out: &mut [f32],
+unsafe fn tiles<const UPDATE: u8, const P: usize, const C: usize>(
+    target: Target,
     left: Left<'_>,
     first: usize,
     b: Operand<'_, f32>,
-    update: Update<'_, f32>,
     mut at: usize,
 ) -> usize {
     let mut masks = [0; P];
@@ -165,22 +187,20 @@ unsafe fn tiles<const P: usize, const C: usize>(
                 );
             }
         }
-        for (column, sums) in sums.iter().enumerate() {
-            for (panel, (&sum, &mask)) in sums.iter().zip(&masks).enumerate() {
-                let start = (at + column) * left.rows + first + panel * ROWS;
-                let place = out[start..].as_mut_ptr();
-                // SAFETY: the rows of the mask are rows of the column, which ends within `out`; other
-                // matrices are as long as `out`.
+        // Plain loops become a straight line, and the sums stay in their registers.
+        for column in 0..C {
+            for panel in 0..P {
+                let (sum, mask) = (sums[column][panel], masks[panel]);
+                let place = (at + column) * left.rows + first + panel * ROWS;
+                // SAFETY: the rows of the mask are rows of the column, which lies within the target.
                 unsafe {
-                    let value = match update {
-                        Update::Replace => sum,
-                        Update::Add => _mm512_add_ps(_mm512_maskz_loadu_ps(mask, place), sum),
-                        Update::Plus(other) => _mm512_add_ps(_mm512_maskz_loadu_ps(mask, other[start..].as_ptr()), sum),
-                        Update::Times(other) => {
-                            _mm512_mul_ps(_mm512_maskz_loadu_ps(mask, other[start..].as_ptr()), sum)
-                        }
+                    let other = target.other.wrapping_add(place);
+                    let value = match UPDATE {
+                        PLUS => _mm512_add_ps(_mm512_maskz_loadu_ps(mask, other), sum),
+                        TIMES => _mm512_mul_ps(_mm512_maskz_loadu_ps(mask, other), sum),
+                        _ => sum,
                     };
-                    _mm512_mask_storeu_ps(place, mask, value);
+                    _mm512_mask_storeu_ps(target.out.wrapping_add(place), mask, value);
                 }
             }
         }
