@@ -124,11 +124,14 @@ impl Reweighting {
         if self.scales.counterfactual() {
             let mut looked_at = stream::shuffled(rows as u32, noise, step);
             looked_at.truncate((self.share * rows as f64).ceil() as usize);
-            let margins = self.margins(source, critic, (noise, step), &looked_at, rows);
+            // The weights are made anew below: until then the margins stand in their memory.
+            let mut margins = std::mem::take(&mut self.weights.combined);
+            self.margins(source, critic, (noise, step), &looked_at, &mut margins);
             for mini_batch in looked_at.chunks(self.mini_batch) {
                 self.counterfactual.update(&margins, mini_batch, counterfactual);
             }
             active = margins.iter().filter(|margin| **margin > 0.0).count();
+            self.weights.combined = margins;
         }
         let active = active as f64 / rows as f64;
         if self.averaged == Averaged::Weight {
@@ -139,18 +142,19 @@ impl Reweighting {
         active
     }
 
-    /// The margins of Eq. 8 of all `rows` transitions; 0 for those that are not looked at.
+    /// Writes the margins of Eq. 8 of all transitions; 0 for those that are not looked at.
     fn margins<T: Scalar>(
         &self,
         source: &Source<'_>,
         critic: (&Critic, &[T]),
         (noise, step): (Noise, u64),
         looked_at: &[u32],
-        rows: usize,
-    ) -> Vec<f32> {
+        margins: &mut [f32],
+    ) {
+        let rows = margins.len();
+        margins.fill(0.0);
         let mut wanted = vec![false; rows];
         looked_at.iter().for_each(|&row| wanted[row as usize] = true);
-        let mut margins = vec![0.0; rows];
         let shares = wanted.par_chunks(SHARE).zip(margins.par_chunks_mut(SHARE)).enumerate();
         shares.for_each(|(index, (wanted, margins))| {
             let share = (index * SHARE..).zip(wanted).filter(|(_, wanted)| **wanted).map(|(row, _)| row);
@@ -173,7 +177,6 @@ impl Reweighting {
                 margins[row % SHARE] = margin.to_f64() as f32;
             }
         });
-        margins
     }
 }
 
