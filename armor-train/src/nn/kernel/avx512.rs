@@ -188,6 +188,7 @@ unsafe fn tiles<const UPDATE: u8, const P: usize, const C: usize>(
             }
         }
         // Plain loops become a straight line, and the sums stay in their registers.
+        #[expect(clippy::needless_range_loop, reason = "an iterator over sums takes their address")]
         for column in 0..C {
             for panel in 0..P {
                 let (sum, mask) = (sums[column][panel], masks[panel]);
