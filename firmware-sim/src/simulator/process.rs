@@ -146,7 +146,7 @@ impl Simulator {
         let _ = self.child.kill();
     }
 
-    /// Waits for its end; the last line of its complaints where it failed.
+    /// Waits for its end; where it failed, the last line of its complaints, or how it ended if it had none.
     fn end(mut self) -> Result<(), String> {
         let status = self.child.wait();
         if let Some(thread) = self.told.take() {
@@ -155,6 +155,8 @@ impl Simulator {
         let complaints = self.complaints.take().and_then(|thread| thread.join().ok()).unwrap_or_default();
         match status {
             Ok(status) if status.success() => Ok(()),
+            // A process that was killed has no time to complain.
+            Ok(status) if complaints.trim().is_empty() => Err(status.to_string()),
             _ => Err(last_line(&complaints).trim_start_matches("error: ").into()),
         }
     }

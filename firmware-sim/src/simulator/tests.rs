@@ -43,7 +43,9 @@ fn a_simulator_that_fails_is_told_of_in_its_own_words() {
     let error = refused("echo 'error: No module named mujoco; install it' >&2; exit 1", &plan);
     assert_eq!(error.to_string(), "the simulator of SafetyBallRun-v0 failed: No module named mujoco; install it");
     let error = refused("exit 3", &plan);
-    assert_eq!(error.to_string(), "the simulator of SafetyBallRun-v0 failed: nothing");
+    assert_eq!(error.to_string(), "the simulator of SafetyBallRun-v0 failed: exit status: 3");
+    let error = refused("kill -9 $$", &plan);
+    assert_eq!(error.to_string(), "the simulator of SafetyBallRun-v0 failed: signal: 9 (SIGKILL)");
     assert!(matches!(refused("exit 0", &plan), SimulatorError::Lost { .. }));
     assert!(matches!(
         refused("echo '{\"episode\": 0, \"rewards\": [], \"costs\": [], \"goals\": 0}'", &plan),
