@@ -14,6 +14,7 @@ use crate::extraction::Extraction;
 use crate::extraction::advantage::{Advantages, Judges};
 use crate::extraction::cloning::Cloning;
 use crate::extraction::condition::Condition;
+use crate::extraction::risk;
 use crate::extraction::weight::{self, BatchWeights};
 use crate::model::{ActorCopy, Model, Optimisers, Parameters};
 use crate::nn::{Scalar, dot, soft_update};
@@ -209,7 +210,12 @@ impl<'d, T: Scalar> Learner<'d, T> {
             value: (value, &parameters.state_value[..]),
         };
         let source = Source::new(&self.config, self.data, &self.normaliser);
-        Some(Cloning::new(&self.config, Advantages::new(&source, judges, self.config.traces())))
+        let cloning = Cloning::new(&self.config, Advantages::new(&source, judges, self.config.traces()));
+        let share = self.config.safest_share;
+        if share == 1.0 {
+            return Some(cloning);
+        }
+        Some(cloning.following(Rows::among(risk::safest(&source, judges.value, (share, self.config.limit)))))
     }
 
     /// Looks at the cloning loss of a step, where it decides which actor flies. Losses before
@@ -230,7 +236,9 @@ impl<'d, T: Scalar> Learner<'d, T> {
         let levels = self.config.diffusion_steps as u32;
         let source = Source::new(&self.config, self.data, &self.normaliser);
         let (cloning, condition) = (self.cloning.as_ref(), self.config.condition);
-        let (weights, rows) = (self.reweighting.weights(), &self.rows);
+        let weights = self.reweighting.weights();
+        let rows = cloning.and_then(Cloning::followed).unwrap_or(&self.rows);
+        let spread = cloning.map_or(0.0, |_| self.config.state_noise);
         let by_batch = self.config.weight_mean == WeightMean::Batch && self.reweighting.is_in_use(step + 1);
         let counterfactual = &self.state.counterfactual;
         let weight = |row: usize| match by_batch {
@@ -246,6 +254,16 @@ impl<'d, T: Scalar> Learner<'d, T> {
                 let row = rows.draw(word);
                 let extra = source.larger_budget(row, word(stream::BUDGET), word(stream::RELABEL));
                 source.fill(&mut worker.batch, sample, row, extra);
+                if spread > 0.0 {
+                    let mut state = worker.batch.state.column_mut(sample);
+                    stream::add_normal(
+                        noise,
+                        stream::STATE_NOISE,
+                        step * batch + place as u64,
+                        spread,
+                        state.as_mut_slice(),
+                    );
+                }
                 let leniency = uniform(word(stream::LENIENCY));
                 worker.batch.weight[sample] = match cloning {
                     None => T::of(weight(row)),

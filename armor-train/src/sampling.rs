@@ -50,6 +50,11 @@ impl Rows {
         Self { len: data.len(), bins }
     }
 
+    /// The rows of some trajectories, which have equal chances.
+    pub(crate) fn among(trajectories: Vec<Range<usize>>) -> Self {
+        Self { len: trajectories.iter().map(ExactSizeIterator::len).sum(), bins: vec![trajectories] }
+    }
+
     /// A row, by a uniform word of each stream that is asked for one.
     pub(crate) fn draw(&self, word: impl Fn(u32) -> u32) -> usize {
         let choose = |stream, count: usize| below(word(stream), count as u32) as usize;

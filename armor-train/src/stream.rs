@@ -31,6 +31,8 @@ pub(crate) const BINS: u32 = 17;
 pub(crate) const REWARD_NOISE: u32 = 18;
 /// Recorded costs that are misread; the tick is the row.
 pub(crate) const COST_ERRORS: u32 = 19;
+/// Noise on the states that an actor is cloned from; the tick is the sample.
+pub(crate) const STATE_NOISE: u32 = 20;
 /// Driving style of a collected trajectory, and its start; the tick is the trajectory.
 pub(crate) const STYLE: u32 = 13;
 /// Noise on collected actions; the tick is the control step.
@@ -51,6 +53,15 @@ pub(crate) const EVALUATION_LENIENCY: u32 = 12;
 pub(crate) const EVALUATION_CHAIN: u32 = 0x300;
 /// Perturbed actions, one stream a perturbation; the tick is the refresh times rows, plus the row.
 pub(crate) const PERTURBATION: u32 = 0x400;
+
+/// Adds `spread` times the draws of [`fill_normal`] to `out`.
+pub(crate) fn add_normal<T: Scalar>(noise: Noise, stream: u32, tick: u64, spread: f64, out: &mut [T]) {
+    for (block, four) in (0..).zip(out.chunks_mut(4)) {
+        for (value, draw) in four.iter_mut().zip(noise.normals(stream, tick, block)) {
+            *value += T::of(spread * f64::from(draw));
+        }
+    }
+}
 
 /// Standard normal draws of a stream and tick, as the controller would draw them.
 pub(crate) fn fill_normal<T: Scalar>(noise: Noise, stream: u32, tick: u64, out: &mut [T]) {

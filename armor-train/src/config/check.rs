@@ -71,6 +71,7 @@ impl Config {
             ("advantage_temperature", self.advantage_temperature),
             ("advantage_lambda", self.advantage_lambda),
             ("advantage_cap", self.advantage_cap),
+            ("state_noise", self.state_noise),
             ("counterfactual_tolerance", self.counterfactual_tolerance),
         ];
         for (key, value) in not_negative {
@@ -84,6 +85,10 @@ impl Config {
         require("critic_steps", self.critic_steps == 0 || self.critic_steps < self.steps, "below steps")?;
         let by_kappa = self.condition == Condition::Kappa;
         require("condition", weighted || by_kappa, "kappa unless extraction is weighted")?;
+        let (share, noise) = (self.safest_share, self.state_noise);
+        require("safest_share", share > 0.0 && share <= 1.0, "above 0 and at most 1")?;
+        require("safest_share", weighted || share == 1.0, "1 unless extraction is weighted")?;
+        require("state_noise", weighted || noise == 0.0, "0 unless extraction is weighted")?;
         require("lambda_max", self.lambda_min <= self.lambda_max, "at least lambda_min")?;
         require("critic_steps", !weighted || self.critic_steps >= 1, "at least 1 where extraction is weighted")?;
         require("actor_average", (0.0..1.0).contains(&self.actor_average), "from 0 to below 1")?;
@@ -155,6 +160,10 @@ mod tests {
         assert_eq!(faults(&sound[..2]).as_deref(), Some(weighted));
         let only = "option `condition` must be kappa unless extraction is weighted";
         assert_eq!(faults(&["condition=lambda"]).as_deref(), Some(only));
+        let share = "option `safest_share` must be 1 unless extraction is weighted";
+        assert_eq!(faults(&["safest_share=0.5"]).as_deref(), Some(share));
+        let noise = "option `state_noise` must be 0 unless extraction is weighted";
+        assert_eq!(faults(&["state_noise=0.5"]).as_deref(), Some(noise));
         let below = "option `critic_steps` must be below steps";
         assert_eq!(faults(&["bootstrap=in_sample", "critic_steps=9000"]).as_deref(), Some(below));
     }
@@ -171,6 +180,9 @@ mod tests {
             "head_layers=0",
             "cost_errors=1.5",
             "weight_decay=-1",
+            "safest_share=0",
+            "safest_share=1.1",
+            "state_noise=-0.1",
             "counterfactual_twins=random",
         ] {
             let mut config = Preset::Paper.config("ball-run", 5.0);

@@ -177,6 +177,12 @@ pub struct Config {
     pub advantage_lambda: f64,
     /// Largest logarithm of an advantage weight.
     pub advantage_cap: f64,
+    /// Share of the trajectories within the limit that weighted extraction clones: those
+    /// whose states have the least mean `V_cL`; 1 clones all that was recorded.
+    pub safest_share: f64,
+    /// Noise on the states that weighted extraction clones from, in units of what the
+    /// networks see. An actor is cloned from few drivers, and meets states near theirs.
+    pub state_noise: f64,
     /// What the actor is conditioned on; kappa in the paper.
     pub condition: Condition,
     /// Smallest price of cost that an actor conditioned on it is trained for.

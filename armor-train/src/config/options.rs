@@ -244,6 +244,14 @@ pub const OPTIONS: [(&str, &[Entry]); 6] = [
             ("advantage_lambda", "price lambda of cost in those weights"),
             ("advantage_cap", "largest logarithm of those weights"),
             (
+                "safest_share",
+                "share of the trajectories within the limit (of all, where none is) that weighted extraction clones: those whose states have the least mean V_cL, for what a trajectory itself cost is in part luck; each has an equal chance then, whatever sampling says; 1 clones all that was recorded",
+            ),
+            (
+                "state_noise",
+                "standard deviation of noise on the states that weighted extraction clones from, in units of what the networks see, so that few drivers teach what to do near their states, too",
+            ),
+            (
                 "condition",
                 "what the actor is conditioned on, beside the state: `kappa` (the paper), `lambda`, the price of cost in its weights, drawn log-uniformly for each sample, to which the command calibrate maps the remaining budget, or `none`; the last two need weighted extraction",
             ),

@@ -115,6 +115,8 @@ impl Preset {
             advantage_temperature: 2.0,
             advantage_lambda: 2.0,
             advantage_cap: 3.0,
+            safest_share: 1.0,
+            state_noise: 0.0,
             condition: Condition::Kappa,
             lambda_min: 0.5,
             lambda_max: 4.0,

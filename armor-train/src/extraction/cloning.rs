@@ -4,6 +4,7 @@ use super::advantage::Advantages;
 use super::condition::{Condition, LambdaRange};
 use super::weight::AdvantageWeight;
 use crate::config::Config;
+use crate::sampling::Rows;
 
 /// Leniencies at which the mean weight of the data is known.
 const GRID: usize = 33;
@@ -14,6 +15,8 @@ pub struct Cloning {
     advantages: Advantages,
     weight: AdvantageWeight,
     price: Price,
+    /// What is cloned, where that is not all that was recorded.
+    followed: Option<Rows>,
 }
 
 #[derive(Clone, Debug)]
@@ -41,7 +44,19 @@ impl Cloning {
                 Price::Drawn { range, log_means: (0..GRID).map(log_mean).collect() }
             }
         };
-        Self { advantages, weight, price }
+        Self { advantages, weight, price, followed: None }
+    }
+
+    /// The same cloning of these rows alone.
+    #[must_use]
+    pub(crate) fn following(mut self, rows: Rows) -> Self {
+        self.followed = Some(rows);
+        self
+    }
+
+    /// What is cloned; none where it is all that was recorded.
+    pub(crate) const fn followed(&self) -> Option<&Rows> {
+        self.followed.as_ref()
     }
 
     /// The logarithm of the weight of transition `row`, for a leniency within 0 and 1 where the price is drawn.

@@ -3,6 +3,7 @@
 pub mod advantage;
 pub mod cloning;
 pub mod condition;
+pub(crate) mod risk;
 pub mod trace;
 pub mod weight;
 

@@ -73,6 +73,55 @@ fn without_temperature_the_weights_are_those_of_eq_10() {
     assert!(ratios.iter().any(|ratio| (ratio - 1.0).abs() > 0.1));
 }
 
+/// The states of the batch of each of the first eleven steps, of which the last trains the actor.
+fn states(config: &Config, data: &Dataset) -> Vec<Vec<f32>> {
+    let mut learner: Learner<'_, f32> = Learner::new(config.clone(), data);
+    let batch = |learner: &Learner<'_, f32>| {
+        learner.workers.iter().flat_map(|worker| worker.batch.state.as_slice().to_vec()).collect()
+    };
+    (0..11).map(|_| (learner.step(), batch(&learner)).1).collect()
+}
+
+#[test]
+fn noise_is_on_the_states_that_the_actor_clones_from_alone() {
+    let (data, plain) = (data(), config());
+    let noisy = Config { state_noise: 0.5, ..plain.clone() };
+    let [plain, noisy] = [plain, noisy].map(|config| states(&config, &data));
+    assert_eq!(plain[..10], noisy[..10]);
+    let added: Vec<f32> = noisy[10].iter().zip(&plain[10]).map(|(noisy, plain)| noisy - plain).collect();
+    let mean_of = |values: &mut dyn Iterator<Item = f32>| values.sum::<f32>() / added.len() as f32;
+    // 328 draws: bounds of four standard errors.
+    assert!(mean_of(&mut added.iter().copied()).abs() < 4.0 * 0.5 / (added.len() as f32).sqrt());
+    let deviation = mean_of(&mut added.iter().map(|x| x * x)).sqrt();
+    assert!((deviation - 0.5).abs() < 4.0 * 0.5 / (2.0 * added.len() as f32).sqrt(), "{deviation}");
+}
+
+#[test]
+fn the_actor_clones_the_safest_trajectories_alone() {
+    let (data, mut config) = (data(), config());
+    config.safest_share = 1e-3;
+    let batches = states(&config, &data);
+    let distinct = |batch: &[f32]| {
+        let states: std::collections::HashSet<Vec<u32>> =
+            batch.chunks(data.state_dim()).map(|state| state.iter().map(|x| x.to_bits()).collect()).collect();
+        states.len()
+    };
+    // Eight trajectories of five rows: the critics see all of them, the actor the rows of one.
+    assert_eq!((distinct(&batches[9]), distinct(&batches[10])), (40, 5));
+}
+
+/// What is followed is not in a checkpoint: frozen critics find it again.
+#[test]
+fn a_resumed_actor_follows_the_same_trajectories_to_the_bit() {
+    let (data, mut config) = (data(), config());
+    (config.safest_share, config.state_noise) = (0.5, 0.3);
+    let mut resumed: Learner<'_, f32> = Learner::resume(config.clone(), &data, after(&config, &data, 15));
+    for _ in 15..20 {
+        resumed.step();
+    }
+    assert_eq!(*resumed.state(), after(&config, &data, 20));
+}
+
 #[test]
 fn a_guided_actor_may_follow_frozen_critics() {
     let data = data();
