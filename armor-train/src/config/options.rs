@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use super::Preset;
+use super::preset::POINT_CIRCLE;
 use crate::study::{ABLATION, Study, Variant};
 
 /// An option of [`Config`](super::Config): its key, and its meaning with equation or reason.
@@ -351,7 +352,23 @@ pub fn document() -> String {
             let _ = writeln!(text, "| `{key}` | {paper} | {quick} | {tuned} | {meaning} |");
         }
     }
+    text.push_str(&by_task());
     text.push_str(&ablation());
+    text
+}
+
+/// What the preset `tuned` has otherwise on a task of its own.
+fn by_task() -> String {
+    let mut text = format!(
+        "\n## `tuned` by task\n\n\
+         The column above holds for most tasks. On {} `tuned` differs (`docs/simulators.md` says why):\n\n\
+         | key | value |\n|---|---|\n",
+        POINT_CIRCLE.map(|task| format!("`{task}`")).join(" and ")
+    );
+    let [most, own] = ["", POINT_CIRCLE[0]].map(|task| Preset::Tuned.config(task, 0.0).options());
+    for (key, value) in own.iter().filter(|(key, value)| *key != "task" && most.get(*key) != Some(value)) {
+        let _ = writeln!(text, "| `{key}` | {} |", plain(value));
+    }
     text
 }
 
