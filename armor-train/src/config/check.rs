@@ -88,6 +88,12 @@ impl Config {
         let (share, noise) = (self.safest_share, self.state_noise);
         require("safest_share", share > 0.0 && share <= 1.0, "above 0 and at most 1")?;
         require("safest_share", weighted || share == 1.0, "1 unless extraction is weighted")?;
+        let by_price = self.condition == Condition::Lambda;
+        require(
+            "safest_share",
+            !by_price || share == 1.0,
+            "1 where condition is lambda, whose weights are of all data",
+        )?;
         require("state_noise", weighted || noise == 0.0, "0 unless extraction is weighted")?;
         require("lambda_max", self.lambda_min <= self.lambda_max, "at least lambda_min")?;
         require("critic_steps", !weighted || self.critic_steps >= 1, "at least 1 where extraction is weighted")?;
@@ -162,6 +168,9 @@ mod tests {
         assert_eq!(faults(&["condition=lambda"]).as_deref(), Some(only));
         let share = "option `safest_share` must be 1 unless extraction is weighted";
         assert_eq!(faults(&["safest_share=0.5"]).as_deref(), Some(share));
+        let priced = "option `safest_share` must be 1 where condition is lambda, whose weights are of all data";
+        let conditioned = [&sound[..], &["condition=lambda", "safest_share=0.5"]].concat();
+        assert_eq!(faults(&conditioned).as_deref(), Some(priced));
         let noise = "option `state_noise` must be 0 unless extraction is weighted";
         assert_eq!(faults(&["state_noise=0.5"]).as_deref(), Some(noise));
         let below = "option `critic_steps` must be below steps";
