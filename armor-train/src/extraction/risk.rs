@@ -91,6 +91,6 @@ mod tests {
         let (all, risks) = kept(1.0, -1.0);
         assert_eq!(all, (0..8).map(|index| index * 140..(index + 1) * 140).collect::<Vec<_>>());
         let least = (0..8).min_by(|&a, &b| risks[a].total_cmp(&risks[b])).unwrap();
-        assert_eq!(kept(1e-9, -1.0).0, [least * 140..(least + 1) * 140]);
+        assert_eq!(kept(1e-9, -1.0).0, vec![least * 140..(least + 1) * 140]);
     }
 }

@@ -4,7 +4,9 @@ use firmware_sim::page::axis::{Scale, label};
 use firmware_sim::page::chart::{Chart, Layer};
 
 use super::folder::RunFolder;
+use crate::critic::bootstrap::Bootstrap;
 use crate::data::{Sorted, ToGo};
+use crate::extraction::Extraction;
 
 /// Charts under one heading.
 pub(super) struct Section<'a> {
@@ -12,19 +14,21 @@ pub(super) struct Section<'a> {
     pub(super) charts: Vec<Chart<'a>>,
 }
 
-/// All charts of a run.
+/// All charts of a run, but those of what it does not have.
 pub(super) fn sections(run: &RunFolder) -> Vec<Section<'_>> {
+    let in_sample = run.config.bootstrap == Bootstrap::InSample;
+    let weighted = run.config.extraction == Extraction::Weighted;
+    let state_values = in_sample.then(|| value_losses(run));
+    let advantages = weighted.then(|| [batch_weights(run), advantage_scales(run)]);
+    let dual = (!weighted).then(|| [lambda(run), penalty(run)]);
+    let critic = [critic_losses(run)].into_iter().chain(state_values).chain([reward_values(run), cost_values(run)]);
+    let actor = [cloning(run)].into_iter().chain(dual.into_iter().flatten()).chain([norms(run)]);
+    let reweighting = [weights(run), active(run)].into_iter().chain(advantages.into_iter().flatten());
     vec![
-        Section {
-            title: "Critic",
-            charts: vec![critic_losses(run), value_losses(run), reward_values(run), cost_values(run)],
-        },
+        Section { title: "Critic", charts: critic.collect() },
         Section { title: "Gradient surgery", charts: vec![conflicts(run), trunk_norms(run)] },
-        Section { title: "Actor and dual", charts: vec![cloning(run), lambda(run), penalty(run), norms(run)] },
-        Section {
-            title: "Reweighting",
-            charts: vec![weights(run), active(run), batch_weights(run), advantage_scales(run)],
-        },
+        Section { title: if weighted { "Actor" } else { "Actor and dual" }, charts: actor.collect() },
+        Section { title: "Reweighting", charts: reweighting.collect() },
         Section { title: "Speed", charts: vec![speed(run)] },
     ]
 }
@@ -259,10 +263,9 @@ mod tests {
     use crate::run::COLUMNS;
     use firmware_sim::page::STYLE;
 
-    #[test]
-    fn every_column_is_drawn() {
-        let (_folder, run) = run(3);
-        let drawn: BTreeSet<*const f64> = sections(&run)
+    /// Columns whose numbers a report of `run` draws.
+    fn drawn(run: &RunFolder) -> BTreeSet<&'static str> {
+        let values: BTreeSet<*const f64> = sections(run)
             .iter()
             .flat_map(|section| &section.charts)
             .flat_map(|chart| &chart.layers)
@@ -272,9 +275,22 @@ mod tests {
                 Layer::Band { .. } | Layer::Level { .. } => Vec::new(),
             })
             .collect();
-        for column in COLUMNS.iter().skip(1) {
-            assert!(drawn.contains(&run.metrics.get(column.name).as_ptr()), "{}", column.name);
-        }
+        let columns = COLUMNS.iter().skip(1).map(|column| column.name);
+        columns.filter(|column| values.contains(&run.metrics.get(column).as_ptr())).collect()
+    }
+
+    /// What a guided run draws and what a weighted one does are all columns together; neither
+    /// draws what it has not.
+    #[test]
+    fn every_column_is_drawn_where_a_run_has_it() {
+        let (_folder, mut run) = run(3);
+        let guided = drawn(&run);
+        (run.config.bootstrap, run.config.extraction) = (Bootstrap::InSample, Extraction::Weighted);
+        let weighted = drawn(&run);
+        assert!(guided.contains("lambda_kappa_0") && !weighted.contains("lambda_kappa_0"), "{guided:?}");
+        assert!(weighted.contains("value_loss_reward") && !guided.contains("value_loss_reward"), "{weighted:?}");
+        let all: BTreeSet<&str> = COLUMNS.iter().skip(1).map(|column| column.name).collect();
+        assert_eq!(&guided | &weighted, all);
     }
 
     #[test]
