@@ -159,9 +159,6 @@ impl Reweighting {
         shares.for_each(|(index, (wanted, margins))| {
             let share = (index * SHARE..).zip(wanted).filter(|(_, wanted)| **wanted).map(|(row, _)| row);
             let share: Vec<usize> = share.collect();
-            if share.is_empty() {
-                return;
-            }
             let mut batch: Batch<T> = source.room(share.len());
             for (sample, &row) in share.iter().enumerate() {
                 source.fill(&mut batch, sample, row, 0.0);

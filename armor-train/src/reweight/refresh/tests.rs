@@ -75,6 +75,22 @@ fn a_refresh_may_look_at_a_share_of_the_data() {
     assert!(raised > 0 && raised <= 30 && active < all);
 }
 
+/// Four shares of a worker's size, of which three have no row to look at.
+#[test]
+fn a_refresh_of_one_row_leaves_all_others_as_they_are() {
+    let data = recording(4, 120, |_| 0.0, |_| 0.0);
+    let mut config = Preset::Paper.config("own", 1.0);
+    ["trunk=8", "head=8", "refresh_share=1e-9"].iter().for_each(|option| config.set(option).unwrap());
+    let model = Model::new(&config, 2, 1);
+    let normaliser = Normaliser::new(&data, false);
+    let source = Source::new(&config, &data, &normaliser);
+    let critic: Vec<f32> = fill(model.critic.size(), 3).into_iter().map(|value| value as f32).collect();
+    let mut counterfactual = vec![1.0; data.len()];
+    let mut reweighting = Reweighting::new(&config, &data);
+    reweighting.refresh(&source, (&model.critic, &critic), (Noise::new(1), 0), &mut counterfactual);
+    assert!(counterfactual.iter().filter(|weight| **weight != 1.0).count() <= 1);
+}
+
 /// Eq. 9 divides by the mean margin of each mini-batch, or of all.
 #[test]
 fn margins_have_their_mean_over_a_mini_batch_or_the_data() {
