@@ -250,19 +250,14 @@ impl<'d, T: Scalar> Learner<'d, T> {
             worker.second_twin = twin & 1 == 1;
             for sample in 0..worker.batch.samples() {
                 let place = worker.first + sample;
+                let tick = step * batch + place as u64;
                 let word = |stream| noise.words(stream, step, place as u32 / 4)[place % 4];
                 let row = rows.draw(word);
                 let extra = source.larger_budget(row, word(stream::BUDGET), word(stream::RELABEL));
                 source.fill(&mut worker.batch, sample, row, extra);
                 if spread > 0.0 {
                     let mut state = worker.batch.state.column_mut(sample);
-                    stream::add_normal(
-                        noise,
-                        stream::STATE_NOISE,
-                        step * batch + place as u64,
-                        spread,
-                        state.as_mut_slice(),
-                    );
+                    stream::add_normal(noise, stream::STATE_NOISE, tick, spread, state.as_mut_slice());
                 }
                 let leniency = uniform(word(stream::LENIENCY));
                 worker.batch.weight[sample] = match cloning {
@@ -276,7 +271,7 @@ impl<'d, T: Scalar> Learner<'d, T> {
                 }
                 worker.levels[sample] = 1 + below(word(stream::LEVELS), levels) as usize;
                 let mut column = worker.cloning.column_mut(sample);
-                stream::fill_normal(noise, stream::CLONING, step * batch + place as u64, column.as_mut_slice());
+                stream::fill_normal(noise, stream::CLONING, tick, column.as_mut_slice());
             }
         });
         if by_batch {

@@ -54,21 +54,20 @@ pub(crate) const EVALUATION_CHAIN: u32 = 0x300;
 /// Perturbed actions, one stream a perturbation; the tick is the refresh times rows, plus the row.
 pub(crate) const PERTURBATION: u32 = 0x400;
 
-/// Adds `spread` times the draws of [`fill_normal`] to `out`.
-pub(crate) fn add_normal<T: Scalar>(noise: Noise, stream: u32, tick: u64, spread: f64, out: &mut [T]) {
-    for (block, four) in (0..).zip(out.chunks_mut(4)) {
-        for (value, draw) in four.iter_mut().zip(noise.normals(stream, tick, block)) {
-            *value += T::of(spread * f64::from(draw));
-        }
-    }
-}
-
 /// Standard normal draws of a stream and tick, as the controller would draw them.
 pub(crate) fn fill_normal<T: Scalar>(noise: Noise, stream: u32, tick: u64, out: &mut [T]) {
+    each_normal(noise, stream, tick, out, |value, draw| *value = T::of_f32(draw));
+}
+
+/// Adds `spread` times the draws of [`fill_normal`] to `out`.
+pub(crate) fn add_normal<T: Scalar>(noise: Noise, stream: u32, tick: u64, spread: f64, out: &mut [T]) {
+    each_normal(noise, stream, tick, out, |value, draw| *value += T::of(spread * f64::from(draw)));
+}
+
+/// Meets each number with its draw.
+fn each_normal<T>(noise: Noise, stream: u32, tick: u64, out: &mut [T], meet: impl Fn(&mut T, f32)) {
     for (block, four) in (0..).zip(out.chunks_mut(4)) {
-        for (value, draw) in four.iter_mut().zip(noise.normals(stream, tick, block)) {
-            *value = T::of_f32(draw);
-        }
+        four.iter_mut().zip(noise.normals(stream, tick, block)).for_each(|(value, draw)| meet(value, draw));
     }
 }
 

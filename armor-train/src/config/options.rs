@@ -365,11 +365,17 @@ fn by_task() -> String {
          | key | value |\n|---|---|\n",
         POINT_CIRCLE.map(|task| format!("`{task}`")).join(" and ")
     );
-    let [most, own] = ["", POINT_CIRCLE[0]].map(|task| Preset::Tuned.config(task, 0.0).options());
-    for (key, value) in own.iter().filter(|(key, value)| *key != "task" && most.get(*key) != Some(value)) {
-        let _ = writeln!(text, "| `{key}` | {} |", plain(value));
+    for (key, value) in tuned_to_task() {
+        let _ = writeln!(text, "| `{key}` | {value} |");
     }
     text
+}
+
+/// The options of `tuned` on [`POINT_CIRCLE`] that differ from those on most tasks.
+fn tuned_to_task() -> Vec<(String, String)> {
+    let [most, own] = ["", POINT_CIRCLE[0]].map(|task| Preset::Tuned.config(task, 0.0).options());
+    let differs = |(key, value): &(String, toml::Value)| key != "task" && most.get(key) != Some(value);
+    own.into_iter().filter(differs).map(|(key, value)| (key, plain(&value))).collect()
 }
 
 /// The variants of the paper's ablation as options.
@@ -405,6 +411,10 @@ pub fn listing() -> String {
             };
             wrap(&mut text, meaning);
         }
+    }
+    let _ = writeln!(text, "\n`tuned` on {}", POINT_CIRCLE.join(" and "));
+    for (key, value) in tuned_to_task() {
+        let _ = writeln!(text, "  {key} = {value}");
     }
     text.trim_end().to_owned()
 }
