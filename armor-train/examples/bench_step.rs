@@ -19,6 +19,10 @@ use armor_train::data::{Dataset, Recording};
 use armor_train::learner::Learner;
 use nalgebra::DMatrix;
 
+/// That of the program `armor-train`.
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
 /// The sizes of `bench/train_step.py`.
 const STATE: usize = 60;
 const ACTION: usize = 2;

@@ -17,7 +17,7 @@ pub mod value;
 
 use nalgebra::DMatrix;
 
-use crate::nn::{Activation, Mlp, Scalar, Tape};
+use crate::nn::{Activation, Mlp, Panels, Passes, Scalar, Tape, Update, Weights};
 
 pub use options::{CostHeads, CostOutput, CriticOptions, Trunk, TwinLoss};
 pub use twins::{Pick, Twins};
@@ -66,8 +66,6 @@ pub struct CriticTape<T: Scalar> {
     input: DMatrix<T>,
     trunks: Vec<Tape<T>>,
     heads: Vec<[Tape<T>; 2]>,
-    /// Gradient with respect to a trunk's output from one head.
-    from_head: DMatrix<T>,
     /// Gradient with respect to the input.
     input_gradient: DMatrix<T>,
 }
@@ -129,27 +127,31 @@ impl Critic {
     /// Room for passes over `samples` columns.
     pub fn tape<T: Scalar>(&self, samples: usize) -> CriticTape<T> {
         let inputs = self.state + 1 + self.action;
-        let trunks: Vec<Tape<T>> = self.trunks.iter().map(|trunk| trunk.tape(samples)).collect();
-        let hidden = trunks.first().map_or(0, |trunk| trunk.output().nrows());
         CriticTape {
             options: self.options,
             input: DMatrix::zeros(inputs, samples),
-            from_head: DMatrix::zeros(hidden, samples),
-            trunks,
+            trunks: self.trunks.iter().map(|trunk| trunk.tape(samples)).collect(),
             heads: self.heads.iter().map(|twins| twins.each_ref().map(|head| head.tape(samples))).collect(),
             input_gradient: DMatrix::zeros(inputs, samples),
         }
     }
 
+    /// The parameters, with copies of all weights for many passes.
+    pub fn pack<'a, T: Scalar>(&self, parameters: &'a [T], passes: Passes) -> Panels<'a, T> {
+        let layers = self.trunks.iter().chain(self.heads.iter().flatten()).flat_map(Mlp::layers);
+        Panels::new(layers, parameters, passes)
+    }
+
     /// Runs the heads of `tasks` on `(s, kappa, a)`; with `slopes`, a backward pass may follow.
-    pub fn forward<T: Scalar>(
+    pub fn forward<'a, T: Scalar>(
         &self,
-        parameters: &[T],
+        weights: impl Into<Weights<'a, T>>,
         tasks: &[Task],
         (state, kappa, action): (&DMatrix<T>, &[T], &DMatrix<T>),
         tape: &mut CriticTape<T>,
         slopes: bool,
     ) {
+        let weights = weights.into();
         let scale = T::of(self.kappa_scale);
         tape.input.rows_mut(0, self.state).copy_from(state);
         for (input, &kappa) in tape.input.row_mut(self.state).iter_mut().zip(kappa) {
@@ -158,13 +160,13 @@ impl Critic {
         tape.input.rows_mut(self.state + 1, self.action).copy_from(action);
         for (index, (trunk, trunk_tape)) in self.trunks.iter().zip(&mut tape.trunks).enumerate() {
             if tasks.iter().any(|&task| self.options.trunk_of(task) == index) {
-                trunk.forward(parameters, &tape.input, trunk_tape, slopes);
+                trunk.forward(weights, &tape.input, trunk_tape, slopes);
             }
         }
         for &task in tasks {
             let (index, hidden) = (self.options.head_of(task), tape.trunks[self.options.trunk_of(task)].output());
             for (head, head_tape) in self.heads[index].iter().zip(&mut tape.heads[index]) {
-                head.forward(parameters, hidden, head_tape, slopes);
+                head.forward(weights, hidden, head_tape, slopes);
             }
         }
     }
@@ -174,15 +176,16 @@ impl Critic {
     /// Head gradients are added to `gradient`, as long as the parameters; the
     /// gradient of the task's trunk is added to `trunk_gradient`. Returns the summed
     /// loss `sum_b sum_i (Q_i - y)^2`; gradients are those of the sum divided by `batch`.
-    pub fn backward_td<T: Scalar>(
+    pub fn backward_td<'a, T: Scalar>(
         &self,
-        parameters: &[T],
+        weights: impl Into<Weights<'a, T>>,
         task: Task,
         target: &[T],
         batch: usize,
         tape: &mut CriticTape<T>,
         (gradient, trunk_gradient): (&mut [T], &mut [T]),
     ) -> f64 {
+        let weights = weights.into();
         let twin_share = self.options.twin_loss.share();
         let scale = T::of(2.0 * twin_share / batch as f64);
         let (pair, trunk) = (self.options.head_of(task), self.options.trunk_of(task));
@@ -195,22 +198,24 @@ impl Critic {
                 loss += twin_share * error.to_f64().powi(2);
                 head_tape.output_gradient()[sample] = scale * error;
             }
-            head.backward(parameters, trunk_tape.output(), head_tape, Some(gradient), Some(&mut tape.from_head));
-            add_head(trunk_tape, &tape.from_head, index == 0);
+            let (hidden, hidden_gradient) = trunk_tape.output_with_gradient();
+            let update = if index == 0 { Update::Replace } else { Update::Add };
+            head.backward(weights, hidden, head_tape, Some(gradient), Some((hidden_gradient, update)));
         }
-        self.trunks[trunk].backward(parameters, &tape.input, trunk_tape, Some(trunk_gradient), None);
+        self.trunks[trunk].backward(weights, &tape.input, trunk_tape, Some(trunk_gradient), None);
         loss
     }
 
     /// The gradient of `sum_b sum_f slope_f,b Q_f(s, kappa, a)_b` with respect to the
     /// action, `A x B`, where `Q_f` is what `pick` makes of the twins of the last forward pass.
-    pub fn action_gradient<T: Scalar>(
+    pub fn action_gradient<'a, T: Scalar>(
         &self,
-        parameters: &[T],
+        weights: impl Into<Weights<'a, T>>,
         (slopes, pick): (&[(Task, &[T])], Pick),
         tape: &mut CriticTape<T>,
         action_gradient: &mut DMatrix<T>,
     ) {
+        let weights = weights.into();
         let mut is_met = vec![false; self.trunks.len()];
         for &(task, slope) in slopes {
             let (pair, trunk) = (self.options.head_of(task), self.options.trunk_of(task));
@@ -221,16 +226,17 @@ impl Critic {
                 two.output_gradient()[sample] = of_two * slope;
             }
             for (head, head_tape) in self.heads[pair].iter().zip([one, two]) {
-                let trunk_tape = &mut tape.trunks[trunk];
-                head.backward(parameters, trunk_tape.output(), head_tape, None, Some(&mut tape.from_head));
-                add_head(trunk_tape, &tape.from_head, !is_met[trunk]);
+                let (hidden, hidden_gradient) = tape.trunks[trunk].output_with_gradient();
+                let update = if is_met[trunk] { Update::Add } else { Update::Replace };
+                head.backward(weights, hidden, head_tape, None, Some((hidden_gradient, update)));
                 is_met[trunk] = true;
             }
         }
         action_gradient.fill(T::zero());
         let trunks = self.trunks.iter().zip(&mut tape.trunks).zip(is_met);
         for ((trunk, trunk_tape), _) in trunks.filter(|(_, is_met)| *is_met) {
-            trunk.backward(parameters, &tape.input, trunk_tape, None, Some(&mut tape.input_gradient));
+            let below = (&mut tape.input_gradient, Update::Replace);
+            trunk.backward(weights, &tape.input, trunk_tape, None, Some(below));
             *action_gradient += tape.input_gradient.rows(self.state + 1, self.action);
         }
     }
@@ -248,15 +254,6 @@ impl<T: Scalar> CriticTape<T> {
         let [one, two] = &self.heads[self.options.head_of(task)];
         let twins = one.output().iter().zip(two.output().iter());
         twins.map(move |(&one, &two)| pick.value(task, [one, two]))
-    }
-}
-
-/// Adds the gradient that came through one head to the trunk's output gradient; the first overwrites.
-fn add_head<T: Scalar>(trunk: &mut Tape<T>, from_head: &DMatrix<T>, is_first: bool) {
-    if is_first {
-        trunk.output_gradient().copy_from(from_head);
-    } else {
-        *trunk.output_gradient() += from_head;
     }
 }
 

@@ -17,7 +17,7 @@ use crate::batch::Batch;
 use crate::critic::bootstrap::InSample;
 use crate::critic::{CriticTape, Task, bellman_target};
 use crate::model::{Model, Optimisers, Parameters};
-use crate::nn::{Scalar, accumulate, clip_norm, soft_update};
+use crate::nn::{Passes, Scalar, Weights, accumulate, clip_norm, soft_update};
 use crate::pcgrad::{self, Order, Surgery};
 
 /// A share of the batch, and room for everything that is computed from it.
@@ -109,23 +109,22 @@ impl<T: Scalar> Worker<T> {
     }
 
     /// Eqs. 3 and 4: targets, losses and the gradient of each task.
-    fn judge(&mut self, model: &Model, parameters: &Parameters<T>, batch_len: usize, draw: &Draw<'_, T>) {
+    fn judge(&mut self, model: &Model, networks: Judging<'_, T>, batch_len: usize, draw: &Draw<'_, T>) {
         let Self { batch, target_tape, critic_tape, in_sample, targets, .. } = self;
         let critic = &model.critic;
         let recorded = (&batch.state, &batch.kappa[..], &batch.action);
         if let (Some(in_sample), Some(value)) = (&mut *in_sample, &model.state_value) {
-            critic.forward(&parameters.target, &Task::ALL, recorded, target_tape, false);
-            in_sample.regress((value, &parameters.state_value), (batch, batch_len), target_tape);
+            critic.forward(networks.target, &Task::ALL, recorded, target_tape, false);
+            in_sample.regress((value, networks.state_value), (batch, batch_len), target_tape);
         } else {
             let (first, denoiser) = (self.first, &model.actor.denoiser);
-            let actor = parameters.actor_copy(model.target_actor);
-            denoiser.prepare(actor, &batch.next_state, &batch.next_kappa, &mut self.next_context);
+            denoiser.prepare(networks.actor, &batch.next_state, &batch.next_kappa, &mut self.next_context);
             let draw = |stage: usize, sample: usize, out: &mut [T]| draw(stage, first + sample, out);
-            self.next_chain.run(denoiser, actor, &self.next_context, &draw);
+            self.next_chain.run(denoiser, networks.actor, &self.next_context, &draw);
             let next = (&batch.next_state, &batch.next_kappa[..], &self.next_chain.action);
-            critic.forward(&parameters.target, &Task::ALL, next, target_tape, false);
+            critic.forward(networks.target, &Task::ALL, next, target_tape, false);
         }
-        critic.forward(&parameters.critic, &Task::ALL, recorded, critic_tape, true);
+        critic.forward(networks.critic, &Task::ALL, recorded, critic_tape, true);
 
         self.critic_gradient.fill(T::zero());
         for (index, task) in Task::ALL.into_iter().enumerate() {
@@ -139,27 +138,39 @@ impl<T: Scalar> Worker<T> {
             trunk_gradient.fill(T::zero());
             let gradients = (&mut self.critic_gradient[..], &mut trunk_gradient[..]);
             self.critic_losses[index] =
-                critic.backward_td(&parameters.critic, task, targets, batch_len, critic_tape, gradients);
+                critic.backward_td(networks.critic, task, targets, batch_len, critic_tape, gradients);
         }
     }
 
     /// The terms of Eqs. 13, 15 and 16.
-    fn act(&mut self, model: &Model, parameters: &Parameters<T>, batch_len: usize, draw: &Draw<'_, T>) {
+    fn act(
+        &mut self,
+        model: &Model,
+        (actor, judges): (Weights<'_, T>, Judges<'_, T>),
+        batch_len: usize,
+        draw: &Draw<'_, T>,
+    ) {
         let first = self.first;
         let draw = |stage: usize, sample: usize, out: &mut [T]| draw(stage, first + sample, out);
         let second_twin = self.second_twin;
         let noise = ActorNoise { levels: &self.levels, cloning: &self.cloning, chain: &draw, second_twin };
-        let (judges, batch) = (judges(model, parameters), (&self.batch, batch_len));
-        self.actor_loss = model.actor.forward(&parameters.actor, judges, batch, &noise, &mut self.actor_tape);
+        let batch = (&self.batch, batch_len);
+        self.actor_loss = model.actor.forward(actor, judges, batch, &noise, &mut self.actor_tape);
     }
 
     /// The gradients of actor and dual, with the factor `guidance` on `Q_r`.
-    fn improve(&mut self, model: &Model, parameters: &Parameters<T>, batch_len: usize, guidance: f64) {
+    fn improve(
+        &mut self,
+        model: &Model,
+        (actor, judges): (Weights<'_, T>, Judges<'_, T>),
+        batch_len: usize,
+        guidance: f64,
+    ) {
         self.actor_gradient.fill(T::zero());
         self.dual_gradient.fill(T::zero());
         model.actor.backward(
-            &parameters.actor,
-            judges(model, parameters),
+            actor,
+            judges,
             (&self.batch, batch_len),
             guidance,
             &mut self.actor_tape,
@@ -168,7 +179,7 @@ impl<T: Scalar> Worker<T> {
     }
 
     /// Eq. 13: the gradient of the actor.
-    fn imitate(&mut self, model: &Model, actor: &[T], batch_len: usize) {
+    fn imitate(&mut self, model: &Model, actor: Weights<'_, T>, batch_len: usize) {
         self.actor_gradient.fill(T::zero());
         self.actor_loss = ActorLoss {
             cloning: model.actor.imitate(
@@ -183,12 +194,14 @@ impl<T: Scalar> Worker<T> {
     }
 }
 
-/// The networks that judge the actor.
-fn judges<'a, T: Scalar>(model: &'a Model, parameters: &'a Parameters<T>) -> Judges<'a, T> {
-    Judges {
-        critic: (&model.critic, parameters.critic_copy(model.policy_critic)),
-        dual: (&model.dual, &parameters.dual),
-    }
+/// The networks of the critic's update.
+#[derive(Clone, Copy)]
+struct Judging<'a, T> {
+    /// The actor that draws the next actions.
+    actor: Weights<'a, T>,
+    target: Weights<'a, T>,
+    critic: Weights<'a, T>,
+    state_value: Weights<'a, T>,
 }
 
 /// Updates the critic: Eqs. 3 and 4 in every share, Eq. 5 on the trunk, one step of Adam;
@@ -205,8 +218,21 @@ pub fn update_critic<T: Scalar>(
     orders: &[[usize; 2]; 3],
 ) -> (CriticMetrics, Vec<T>) {
     let batch_len = workers.iter().map(|worker| worker.batch.samples()).sum();
-    let shared = &*parameters;
-    workers.par_iter_mut().for_each(|worker| worker.judge(model, shared, batch_len, draw));
+    {
+        // Where targets bootstrap from state values, no actor is asked.
+        let actor = parameters.actor_copy(model.target_actor);
+        let actor_panels = model.state_value.is_none().then(|| model.actor.denoiser.pack(actor, Passes::Forward));
+        let value_panels = model.state_value.as_ref().map(|value| value.pack(&parameters.state_value, Passes::Both));
+        let target = model.critic.pack(&parameters.target, Passes::Forward);
+        let critic = model.critic.pack(&parameters.critic, Passes::Both);
+        let networks = Judging {
+            actor: actor_panels.as_ref().map_or(actor.into(), Weights::from),
+            target: (&target).into(),
+            critic: (&critic).into(),
+            state_value: value_panels.as_ref().map_or((&parameters.state_value).into(), Weights::from),
+        };
+        workers.par_iter_mut().for_each(|worker| worker.judge(model, networks, batch_len, draw));
+    }
 
     let mut gradient = vec![T::zero(); model.critic.size()];
     let mut trunk = [(); 3].map(|()| vec![T::zero(); model.critic.trunk_size()]);
@@ -246,8 +272,8 @@ pub fn update_imitation<T: Scalar>(
     workers: &mut [Worker<T>],
 ) -> (f64, Vec<T>) {
     let batch_len = workers.iter().map(|worker| worker.batch.samples()).sum();
-    let shared = &parameters.actor[..];
-    workers.par_iter_mut().for_each(|worker| worker.imitate(model, shared, batch_len));
+    let actor = model.actor.denoiser.pack(&parameters.actor, Passes::Both);
+    workers.par_iter_mut().for_each(|worker| worker.imitate(model, (&actor).into(), batch_len));
 
     let mut gradient = vec![T::zero(); parameters.actor.len()];
     let mut loss = 0.0;
@@ -272,19 +298,22 @@ pub fn update_actor<T: Scalar>(
     draw: &Draw<'_, T>,
 ) -> (ActorLoss, [Vec<T>; 2]) {
     let batch_len = workers.iter().map(|worker| worker.batch.samples()).sum();
-    let shared = &*parameters;
+    let actor = model.actor.denoiser.pack(&parameters.actor, Passes::Both);
+    let critic = model.critic.pack(parameters.critic_copy(model.policy_critic), Passes::Both);
+    let judges = Judges { critic: (&model.critic, (&critic).into()), dual: (&model.dual, &parameters.dual) };
+    let networks = ((&actor).into(), judges);
     let constant = model.actor.guidance.constant(model.actor.eta);
     workers.par_iter_mut().for_each(|worker| {
-        worker.act(model, shared, batch_len, draw);
+        worker.act(model, networks, batch_len, draw);
         if let Some(guidance) = constant {
-            worker.improve(model, shared, batch_len, guidance);
+            worker.improve(model, networks, batch_len, guidance);
         }
     });
     let loss = workers.iter().fold(ActorLoss::default(), |sum, worker| sum + worker.actor_loss);
     let loss = loss * (1.0 / batch_len as f64);
     if constant.is_none() {
         let guidance = model.actor.guidance.factor(model.actor.eta, loss.reward_size);
-        workers.par_iter_mut().for_each(|worker| worker.improve(model, shared, batch_len, guidance));
+        workers.par_iter_mut().for_each(|worker| worker.improve(model, networks, batch_len, guidance));
     }
 
     let mut gradient = vec![T::zero(); parameters.actor.len()];

@@ -5,7 +5,7 @@ use armor_core::schedule::ChainStep;
 use nalgebra::DMatrix;
 
 use super::denoiser::{Call, Context, Denoiser};
-use crate::nn::Scalar;
+use crate::nn::{Scalar, Weights};
 
 /// Where a chain takes its noise from: `draw(stage, sample, out)` fills `out`
 /// `[A]` with standard normal draws; stage 0 is the start `a^N`, stage `i + 1` the
@@ -42,7 +42,14 @@ impl<T: Scalar> Chain<T> {
     ///
     /// A sample whose estimate `x0` is clipped in every entry passes no gradient to
     /// the network at that step: its part of the call is not kept.
-    pub fn run(&mut self, denoiser: &Denoiser, parameters: &[T], context: &Context<T>, draw: &Draw<'_, T>) {
+    pub fn run<'a>(
+        &mut self,
+        denoiser: &Denoiser,
+        weights: impl Into<Weights<'a, T>>,
+        context: &Context<T>,
+        draw: &Draw<'_, T>,
+    ) {
+        let weights = weights.into();
         let rows = self.action.nrows();
         let forgotten = self.steps.len() - self.gradient_steps;
         let mut noise = vec![T::zero(); rows];
@@ -57,7 +64,7 @@ impl<T: Scalar> Chain<T> {
             let call = &mut self.calls[slot];
             call.action.copy_from(&self.action);
             call.levels.fill(step.n);
-            denoiser.forward(parameters, context, call, gradient);
+            denoiser.forward(weights, context, call, gradient);
             let [from_action, from_noise, to_x0, to_action, sigma] = coefficients::<T>(step);
             for (sample, mut column) in self.action.column_iter_mut().enumerate() {
                 if step.sigma != 0.0 {
@@ -86,14 +93,15 @@ impl<T: Scalar> Chain<T> {
 
     /// Back-propagates `action_gradient`, `A x B`, with respect to the end of
     /// the last run, through the remembered steps; adds to `gradient` and to the gradients in `context`.
-    pub fn backward(
+    pub fn backward<'a>(
         &mut self,
         denoiser: &Denoiser,
-        parameters: &[T],
+        weights: impl Into<Weights<'a, T>>,
         context: &mut Context<T>,
         action_gradient: &DMatrix<T>,
         gradient: &mut [T],
     ) {
+        let weights = weights.into();
         let mut after = action_gradient.clone();
         let remembered = &self.steps[self.steps.len() - self.gradient_steps..];
         for (index, (step, inside)) in remembered.iter().zip(&self.inside).enumerate().rev() {
@@ -107,7 +115,7 @@ impl<T: Scalar> Chain<T> {
             let estimate = after.component_mul(inside) * to_x0;
             let noise_gradient = estimate.select_columns(call.kept()) * -from_noise;
             call.noise_gradient().columns_mut(0, noise_gradient.ncols()).copy_from(&noise_gradient);
-            denoiser.backward(parameters, context, call, gradient);
+            denoiser.backward(weights, context, call, gradient);
             after = after * to_action + estimate * from_action;
             for (column, &sample) in call.kept().iter().enumerate() {
                 let mut sum = after.column_mut(sample);

@@ -14,7 +14,8 @@ use std::ops::Range;
 use nalgebra::DMatrix;
 
 use crate::nn::{
-    Activation, Frequencies, Linear, Mlp, Operand, Packed, Scalar, Tape, Update, keep_columns, product, sinusoidal_code,
+    Activation, Frequencies, Linear, Mlp, Operand, Panels, Passes, Scalar, Tape, Update, Weights, keep_columns,
+    product, sinusoidal_code,
 };
 
 /// Widths of the network.
@@ -69,9 +70,6 @@ pub struct Context<T: Scalar> {
     /// `W_n e_n`, `H x N`; column `n - 1` for noise level `n`.
     table: DMatrix<T>,
     table_gradient: DMatrix<T>,
-    /// The weights of the body, as every call of the chain reads them, and their transposes.
-    body: Vec<Packed<T>>,
-    body_transposed: Vec<Packed<T>>,
 }
 
 /// One call of the network.
@@ -216,6 +214,11 @@ impl Denoiser {
         }
     }
 
+    /// The parameters, with copies of the weights that every call of a chain reads.
+    pub fn pack<'a, T: Scalar>(&self, parameters: &'a [T], passes: Passes) -> Panels<'a, T> {
+        Panels::new(self.body.layers().iter(), parameters, passes)
+    }
+
     /// Room for the context of `samples` columns.
     pub fn context<T: Scalar>(&self, samples: usize) -> Context<T> {
         let Widths { hidden, steps, time_code, .. } = self.widths;
@@ -229,8 +232,6 @@ impl Denoiser {
             constant_gradient: DMatrix::zeros(hidden, samples),
             table: DMatrix::zeros(hidden, steps),
             table_gradient: DMatrix::zeros(hidden, steps),
-            body: Vec::new(),
-            body_transposed: Vec::new(),
         }
     }
 
@@ -251,7 +252,14 @@ impl Denoiser {
     }
 
     /// Computes the context of states `S x B` and budgets `[B]`, and forgets the gradients in it.
-    pub fn prepare<T: Scalar>(&self, parameters: &[T], state: &DMatrix<T>, kappa: &[T], context: &mut Context<T>) {
+    pub fn prepare<'a, T: Scalar>(
+        &self,
+        weights: impl Into<Weights<'a, T>>,
+        state: &DMatrix<T>,
+        kappa: &[T],
+        context: &mut Context<T>,
+    ) {
+        let parameters = weights.into().parameters();
         let scale = T::of(self.kappa_scale);
         for (input, &kappa) in context.kappa_input.iter_mut().zip(kappa) {
             *input = scale * kappa;
@@ -273,18 +281,28 @@ impl Denoiser {
         product(table, self.first.block(parameters, of_time), context.time.output().into(), Update::Replace);
         context.constant_gradient.fill(T::zero());
         context.table_gradient.fill(T::zero());
-        self.body.pack(parameters, &mut context.body);
-        self.body.pack_transposed(parameters, &mut context.body_transposed);
     }
 
     /// Predicts the noise in `call.action` at `call.levels`; with `slopes`, a backward pass may follow.
-    pub fn forward<T: Scalar>(&self, parameters: &[T], context: &Context<T>, call: &mut Call<T>, slopes: bool) {
+    pub fn forward<'a, T: Scalar>(
+        &self,
+        weights: impl Into<Weights<'a, T>>,
+        context: &Context<T>,
+        call: &mut Call<T>,
+        slopes: bool,
+    ) {
+        let weights = weights.into();
         call.kept.clear();
         call.kept.extend(0..call.action.ncols());
         if self.sees_action {
             let [of_action, ..] = self.blocks();
             let (hidden, constant) = (call.hidden.as_mut_slice(), context.constant.as_slice());
-            product(hidden, self.first.block(parameters, of_action), (&call.action).into(), Update::Plus(constant));
+            product(
+                hidden,
+                self.first.block(weights.parameters(), of_action),
+                (&call.action).into(),
+                Update::Plus(constant),
+            );
         } else {
             call.hidden.copy_from(&context.constant);
         }
@@ -294,21 +312,22 @@ impl Denoiser {
             &context.table,
             &call.levels,
         );
-        self.body.forward_packed((parameters, &context.body), &call.hidden, &mut call.body, slopes);
+        self.body.forward(weights, &call.hidden, &mut call.body, slopes);
     }
 
     /// Back-propagates [`Call::noise_gradient`]: adds to `gradient` and to the
     /// gradients in `context`, and writes [`Call::action_gradient`].
-    pub fn backward<T: Scalar>(
+    pub fn backward<'a, T: Scalar>(
         &self,
-        parameters: &[T],
+        weights: impl Into<Weights<'a, T>>,
         context: &mut Context<T>,
         call: &mut Call<T>,
         gradient: &mut [T],
     ) {
+        let weights = weights.into();
         let Call { hidden, hidden_slope, hidden_gradient, body, .. } = call;
-        let below = (&mut *hidden_gradient, &*hidden_slope);
-        self.body.backward_packed(&context.body_transposed, hidden, body, gradient, below);
+        let below = (&mut *hidden_gradient, Update::Times(hidden_slope.as_slice()));
+        self.body.backward(weights, hidden, body, Some(gradient), Some(below));
         let columns = call.kept.len();
 
         // A network that does not see the action leaves its gradient at zero.
@@ -316,9 +335,9 @@ impl Denoiser {
             let [of_action, ..] = self.blocks();
             let (delta, action) = (Operand::leading(hidden_gradient, columns), Operand::leading(&call.action, columns));
             self.first.add_block_gradient(gradient, of_action.clone(), delta, action);
-            let weights = self.first.block(parameters, of_action).transposed();
+            let of_action = self.first.block(weights.parameters(), of_action).transposed();
             let action_gradient = &mut call.action_gradient.as_mut_slice()[..self.widths.action * columns];
-            product(action_gradient, weights, delta, Update::Replace);
+            product(action_gradient, of_action, delta, Update::Replace);
         }
         for (column, &sample) in hidden_gradient.column_iter().zip(&call.kept) {
             let mut constant_sum = context.constant_gradient.column_mut(sample);
@@ -329,13 +348,14 @@ impl Denoiser {
     }
 
     /// Carries the gradients in `context` on to the embeddings and the rest of the first layer.
-    pub fn finish<T: Scalar>(
+    pub fn finish<'a, T: Scalar>(
         &self,
-        parameters: &[T],
+        weights: impl Into<Weights<'a, T>>,
         state: &DMatrix<T>,
         context: &mut Context<T>,
         gradient: &mut [T],
     ) {
+        let parameters = weights.into().parameters();
         let [_, of_state, of_kappa, of_time] = self.blocks();
         let Context {
             kappa_input, kappa, time_code, time_code_gradient, time, constant_gradient, table_gradient, ..
@@ -356,7 +376,13 @@ impl Denoiser {
         match &self.frequencies {
             None => self.time.backward(parameters, time_code, time, Some(gradient), None),
             Some(frequencies) => {
-                self.time.backward(parameters, time_code, time, Some(gradient), Some(time_code_gradient));
+                self.time.backward(
+                    parameters,
+                    time_code,
+                    time,
+                    Some(gradient),
+                    Some((time_code_gradient, Update::Replace)),
+                );
                 frequencies.add_gradient(time_code, time_code_gradient, gradient);
             }
         }

@@ -20,7 +20,7 @@ use serde::{Deserialize, Serialize};
 use crate::batch::Batch;
 use crate::critic::{Critic, CriticTape, Pick, Task, Twins};
 use crate::dual::{Dual, DualTape};
-use crate::nn::Scalar;
+use crate::nn::{Scalar, Weights};
 use chain::{Chain, Draw, clip, coefficients};
 use chains::Chains;
 use denoiser::{Call, Context, Denoiser};
@@ -144,7 +144,7 @@ pub struct ActorNoise<'a, T: Scalar> {
 #[derive(Clone, Copy)]
 pub struct Judges<'a, T: Scalar> {
     /// The live critic and its parameters.
-    pub critic: (&'a Critic, &'a [T]),
+    pub critic: (&'a Critic, Weights<'a, T>),
     /// The dual network and its parameters.
     pub dual: (&'a Dual, &'a [T]),
 }
@@ -198,23 +198,24 @@ impl Actor {
 
     /// The terms of `L_phi` (Eq. 15) and `L_lambda` (Eq. 16), summed over `batch`, a
     /// share of `batch_len` samples; [`Actor::backward`] may follow.
-    pub fn forward<T: Scalar>(
+    pub fn forward<'a, T: Scalar>(
         &self,
-        parameters: &[T],
+        weights: impl Into<Weights<'a, T>>,
         judges: Judges<'_, T>,
         (batch, batch_len): (&Batch<T>, usize),
         noise: &ActorNoise<'_, T>,
         tape: &mut ActorTape<T>,
     ) -> ActorLoss {
+        let weights = weights.into();
         let share = T::of(1.0 / batch_len as f64);
-        self.denoiser.prepare(parameters, &batch.state, &batch.kappa, &mut tape.context);
-        let cloning = self.clone_behaviour(parameters, batch, share, (noise.levels, noise.cloning), tape);
-        self.sample(parameters, noise, tape);
+        self.denoiser.prepare(weights, &batch.state, &batch.kappa, &mut tape.context);
+        let cloning = self.clone_behaviour(weights, batch, share, (noise.levels, noise.cloning), tape);
+        self.sample(weights, noise, tape);
 
-        let (critic, critic_parameters) = judges.critic;
+        let (critic, critic_weights) = judges.critic;
         let tasks = [Task::Reward, Task::LongCost];
         let at_policy = (&batch.state, &batch.kappa[..], &tape.action);
-        critic.forward(critic_parameters, &tasks, at_policy, &mut tape.critic, true);
+        critic.forward(critic_weights, &tasks, at_policy, &mut tape.critic, true);
         tape.pick = Pick { twins: self.twins, second: noise.second_twin };
         let scale = T::of(self.constraint_scale);
         let pairs = tape.critic.values(Task::LongCost, tape.pick).zip(&batch.threshold);
@@ -238,47 +239,49 @@ impl Actor {
 
     /// The gradients of `L_phi` and `L_lambda` after [`Actor::forward`], added to `gradient`
     /// and `dual_gradient`, with the factor `guidance` on `Q_r`; means are over `batch_len` samples.
-    pub fn backward<T: Scalar>(
+    pub fn backward<'a, T: Scalar>(
         &self,
-        parameters: &[T],
+        weights: impl Into<Weights<'a, T>>,
         judges: Judges<'_, T>,
         (batch, batch_len): (&Batch<T>, usize),
         guidance: f64,
         tape: &mut ActorTape<T>,
         (gradient, dual_gradient): (&mut [T], &mut [T]),
     ) {
+        let weights = weights.into();
         let share = T::of(1.0 / batch_len as f64);
-        let ((critic, critic_parameters), (dual, dual_parameters)) = (judges.critic, judges.dual);
+        let ((critic, critic_weights), (dual, dual_parameters)) = (judges.critic, judges.dual);
         dual.backward(dual_parameters, &tape.violation, batch_len, &mut tape.dual, dual_gradient);
 
         let scale = T::of(self.constraint_scale);
         let reward_slope = vec![-T::of(guidance) * share; batch.samples()];
         let cost_slope: Vec<T> = tape.dual.lambda.iter().map(|&lambda| lambda * scale * share).collect();
         let slopes = [(Task::Reward, &reward_slope[..]), (Task::LongCost, &cost_slope[..])];
-        critic.action_gradient(critic_parameters, (&slopes, tape.pick), &mut tape.critic, &mut tape.action_gradient);
+        critic.action_gradient(critic_weights, (&slopes, tape.pick), &mut tape.critic, &mut tape.action_gradient);
 
-        self.improve(parameters, tape, gradient);
-        self.denoiser.backward(parameters, &mut tape.context, &mut tape.call, gradient);
-        self.denoiser.finish(parameters, &batch.state, &mut tape.context, gradient);
+        self.improve(weights, tape, gradient);
+        self.denoiser.backward(weights, &mut tape.context, &mut tape.call, gradient);
+        self.denoiser.finish(weights, &batch.state, &mut tape.context, gradient);
     }
 
     /// The gradient of `L_BC` (Eq. 13) alone, added to `gradient`, for noise levels `[B]` and noise
     /// `A x B`; the mean is over `batch_len` samples, of which `batch` is a share. Returns the summed loss.
     ///
     /// The embedding sees what the batch says the actor is conditioned on.
-    pub fn imitate<T: Scalar>(
+    pub fn imitate<'a, T: Scalar>(
         &self,
-        parameters: &[T],
+        weights: impl Into<Weights<'a, T>>,
         (batch, batch_len): (&Batch<T>, usize),
         noise: (&[usize], &DMatrix<T>),
         tape: &mut ActorTape<T>,
         gradient: &mut [T],
     ) -> f64 {
+        let weights = weights.into();
         let share = T::of(1.0 / batch_len as f64);
-        self.denoiser.prepare(parameters, &batch.state, &batch.condition, &mut tape.context);
-        let loss = self.clone_behaviour(parameters, batch, share, noise, tape);
-        self.denoiser.backward(parameters, &mut tape.context, &mut tape.call, gradient);
-        self.denoiser.finish(parameters, &batch.state, &mut tape.context, gradient);
+        self.denoiser.prepare(weights, &batch.state, &batch.condition, &mut tape.context);
+        let loss = self.clone_behaviour(weights, batch, share, noise, tape);
+        self.denoiser.backward(weights, &mut tape.context, &mut tape.call, gradient);
+        self.denoiser.finish(weights, &batch.state, &mut tape.context, gradient);
         loss
     }
 
@@ -287,7 +290,7 @@ impl Actor {
     /// recorded action itself, and sees the noise alone. Returns the summed loss.
     fn clone_behaviour<T: Scalar>(
         &self,
-        parameters: &[T],
+        weights: Weights<'_, T>,
         batch: &Batch<T>,
         share: T,
         (levels, noise): (&[usize], &DMatrix<T>),
@@ -311,7 +314,7 @@ impl Actor {
                 &batch.action
             }
         };
-        self.denoiser.forward(parameters, &tape.context, call, true);
+        self.denoiser.forward(weights, &tape.context, call, true);
         let mut loss = 0.0;
         for (sample, &weight) in batch.weight.iter().enumerate() {
             let error = call.noise().column(sample) - target.column(sample);
@@ -322,12 +325,12 @@ impl Actor {
     }
 
     /// `a_pi`, by the full chain or by the one-step estimate.
-    fn sample<T: Scalar>(&self, parameters: &[T], noise: &ActorNoise<'_, T>, tape: &mut ActorTape<T>) {
+    fn sample<T: Scalar>(&self, weights: Weights<'_, T>, noise: &ActorNoise<'_, T>, tape: &mut ActorTape<T>) {
         match self.policy_gradient {
             PolicyGradient::Full | PolicyGradient::LastK => {
                 let lent = || tape.chains.lend(tape.action.ncols(), || self.chain(tape.action.ncols()));
                 let chain = tape.chain.get_or_insert_with(lent);
-                chain.run(&self.denoiser, parameters, &tape.context, noise.chain);
+                chain.run(&self.denoiser, weights, &tape.context, noise.chain);
                 tape.action.copy_from(&chain.action);
             }
             PolicyGradient::OneStep => {
@@ -344,12 +347,12 @@ impl Actor {
     }
 
     /// Carries the critics' gradient at `a_pi` back to the network.
-    fn improve<T: Scalar>(&self, parameters: &[T], tape: &mut ActorTape<T>, gradient: &mut [T]) {
+    fn improve<T: Scalar>(&self, weights: Weights<'_, T>, tape: &mut ActorTape<T>, gradient: &mut [T]) {
         let ActorTape { context, call, chain, chains, inside, action_gradient, .. } = tape;
         match self.policy_gradient {
             PolicyGradient::Full | PolicyGradient::LastK => {
                 if let Some(mut chain) = chain.take() {
-                    chain.backward(&self.denoiser, parameters, context, action_gradient, gradient);
+                    chain.backward(&self.denoiser, weights, context, action_gradient, gradient);
                     chains.give_back(chain);
                 }
             }

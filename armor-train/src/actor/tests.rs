@@ -89,8 +89,10 @@ impl Fixture {
         let mut tape = self.actor.tape(&self.critic, &self.dual, SAMPLES, Arc::default());
         let mut gradient = vec![0.0; parameters.len()];
         let mut dual_gradient = vec![0.0; self.dual_parameters.len()];
-        let judges =
-            Judges { critic: (&self.critic, &self.critic_parameters), dual: (&self.dual, &self.dual_parameters) };
+        let judges = Judges {
+            critic: (&self.critic, (&self.critic_parameters).into()),
+            dual: (&self.dual, &self.dual_parameters),
+        };
         let noise = ActorNoise { levels: &self.levels, cloning: &self.cloning, chain: &draw, second_twin: true };
         let batch = (&self.batch, SAMPLES);
         let loss = self.actor.forward(parameters, judges, batch, &noise, &mut tape);

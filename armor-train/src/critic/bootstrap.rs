@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::value::{StateValue, StateValueTape};
 use super::{CriticTape, Task};
 use crate::batch::Batch;
-use crate::nn::Scalar;
+use crate::nn::{Scalar, Weights};
 
 /// What the critics' targets bootstrap from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -46,18 +46,18 @@ impl<T: Scalar> InSample<T> {
     /// Means are over `batch_len` samples, of which `batch` is a share.
     pub fn regress(
         &mut self,
-        (value, parameters): (&StateValue, &[T]),
+        (value, weights): (&StateValue, Weights<'_, T>),
         (batch, batch_len): (&Batch<T>, usize),
         target: &CriticTape<T>,
     ) {
         let at = |state: &DMatrix<T>, kappa: &[T], tape: &mut StateValueTape<T>, slopes| {
-            value.forward(parameters, &Task::ALL, (state, kappa), tape, slopes);
+            value.forward(weights, &Task::ALL, (state, kappa), tape, slopes);
         };
         at(&batch.state, &batch.kappa, &mut self.here, true);
         self.gradient.fill(T::zero());
         for (loss, task) in self.losses.iter_mut().zip(Task::ALL) {
             let at_recorded = target.pessimistic(task);
-            *loss = value.backward(parameters, task, at_recorded, batch_len, &mut self.here, &mut self.gradient);
+            *loss = value.backward(weights, task, at_recorded, batch_len, &mut self.here, &mut self.gradient);
         }
         at(&batch.next_state, &batch.next_kappa, &mut self.next, false);
     }

@@ -14,7 +14,7 @@ use nalgebra::DMatrix;
 
 use super::Task;
 use super::expectile::expectile_loss;
-use crate::nn::{Activation, Mlp, Scalar, Tape};
+use crate::nn::{Activation, Mlp, Panels, Passes, Scalar, Tape, Weights};
 
 /// Layout of the three state-value networks within their parameters, in the order of [`Task::ALL`].
 #[derive(Clone, Debug)]
@@ -57,6 +57,11 @@ impl StateValue {
         }
     }
 
+    /// The parameters, with copies of all weights for many passes.
+    pub fn pack<'a, T: Scalar>(&self, parameters: &'a [T], passes: Passes) -> Panels<'a, T> {
+        Panels::new(self.networks.iter().flat_map(Mlp::layers), parameters, passes)
+    }
+
     /// Room for passes over `samples` columns.
     pub fn tape<T: Scalar>(&self, samples: usize) -> StateValueTape<T> {
         StateValueTape {
@@ -66,14 +71,15 @@ impl StateValue {
     }
 
     /// Computes the values of `tasks` at `(s, kappa)`; with `slopes`, a backward pass may follow.
-    pub fn forward<T: Scalar>(
+    pub fn forward<'a, T: Scalar>(
         &self,
-        parameters: &[T],
+        weights: impl Into<Weights<'a, T>>,
         tasks: &[Task],
         (state, kappa): (&DMatrix<T>, &[T]),
         tape: &mut StateValueTape<T>,
         slopes: bool,
     ) {
+        let weights = weights.into();
         let scale = T::of(self.kappa_scale);
         tape.input.rows_mut(0, self.state).copy_from(state);
         for (input, &kappa) in tape.input.row_mut(self.state).iter_mut().zip(kappa) {
@@ -81,7 +87,7 @@ impl StateValue {
         }
         for &task in tasks {
             let index = task as usize;
-            self.networks[index].forward(parameters, &tape.input, &mut tape.networks[index], slopes);
+            self.networks[index].forward(weights, &tape.input, &mut tape.networks[index], slopes);
         }
     }
 
@@ -89,9 +95,9 @@ impl StateValue {
     /// the parameters, from the last forward pass.
     ///
     /// Returns the summed loss; the gradient is that of the sum divided by `batch`.
-    pub fn backward<T: Scalar>(
+    pub fn backward<'a, T: Scalar>(
         &self,
-        parameters: &[T],
+        weights: impl Into<Weights<'a, T>>,
         task: Task,
         target: impl Iterator<Item = T>,
         batch: usize,
@@ -107,7 +113,7 @@ impl StateValue {
             sum += loss.to_f64();
             tape_of.output_gradient()[sample] = -slope * share;
         }
-        network.backward(parameters, &tape.input, tape_of, Some(gradient), None);
+        network.backward(weights, &tape.input, tape_of, Some(gradient), None);
         sum
     }
 }

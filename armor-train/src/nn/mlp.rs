@@ -2,8 +2,8 @@
 
 use nalgebra::DMatrix;
 
-use super::product::{Operand, Packed, Update, product};
-use super::{Activation, Linear, Scalar, Tape};
+use super::product::{Operand, Update};
+use super::{Activation, Linear, Scalar, Tape, Weights};
 
 /// Layout of a stack of layers within a parameter vector.
 #[derive(Clone, Debug)]
@@ -47,52 +47,22 @@ impl Mlp {
         if layer + 1 < self.layers.len() { Some(self.activation) } else { self.output }
     }
 
-    /// The weights, for many forward passes with the same parameters; `packed` is what is replaced.
-    pub fn pack<T: Scalar>(&self, parameters: &[T], packed: &mut Vec<Packed<T>>) {
-        pack(self.layers.iter().map(|layer| layer.weights(parameters)), packed);
-    }
-
-    /// As [`Mlp::pack`], of the transposed weights, for backward passes.
-    pub fn pack_transposed<T: Scalar>(&self, parameters: &[T], packed: &mut Vec<Packed<T>>) {
-        pack(self.layers.iter().map(|layer| layer.weights(parameters).transposed()), packed);
-    }
-
     /// Runs the stack on `input`, `inputs x samples`; with `slopes`, a backward pass may follow.
-    pub fn forward<T: Scalar>(&self, parameters: &[T], input: &DMatrix<T>, tape: &mut Tape<T>, slopes: bool) {
-        self.run(parameters, input, tape, slopes, |layer, out, input| {
-            product(out, self.layers[layer].weights(parameters), input, Update::Replace);
-        });
-    }
-
-    /// As [`Mlp::forward`], with the parameters' [`Mlp::pack`].
-    pub fn forward_packed<T: Scalar>(
+    pub fn forward<'a, T: Scalar>(
         &self,
-        (parameters, weights): (&[T], &[Packed<T>]),
+        weights: impl Into<Weights<'a, T>>,
         input: &DMatrix<T>,
         tape: &mut Tape<T>,
         slopes: bool,
     ) {
-        self.run(parameters, input, tape, slopes, |layer, out, input| {
-            weights[layer].multiply(out, input, Update::Replace);
-        });
-    }
-
-    /// A forward pass; `multiply` writes the product of a layer's weights and its input.
-    fn run<T: Scalar>(
-        &self,
-        parameters: &[T],
-        input: &DMatrix<T>,
-        tape: &mut Tape<T>,
-        slopes: bool,
-        multiply: impl Fn(usize, &mut [T], Operand<'_, T>),
-    ) {
+        let weights = weights.into();
         tape.columns = input.ncols();
         for (index, layer) in self.layers.iter().enumerate() {
             let (before, rest) = tape.values.split_at_mut(index);
             let input = before.last().unwrap_or(input);
             let values = &mut rest[0];
-            multiply(index, values.as_mut_slice(), input.into());
-            let bias = layer.bias(parameters);
+            weights.multiply(layer, values.as_mut_slice(), input.into(), Update::Replace);
+            let bias = layer.bias(weights.parameters());
             match self.activation(index) {
                 Some(activation) => activation.apply(values, slopes.then_some(&mut tape.slopes[index]), bias),
                 None => add_bias(values, bias),
@@ -102,48 +72,18 @@ impl Mlp {
 
     /// Back-propagates [`Tape::output_gradient`] through the last forward pass.
     ///
-    /// Adds to `gradient` (as long as the parameters) where it is given, and
-    /// writes the gradient with respect to the input where `input_gradient` is given.
+    /// Adds to `gradient` (as long as the parameters) where it is given. Where `input_gradient`
+    /// is given, the gradient with respect to the input updates it.
     /// After [`Tape::keep`] this holds for the leading columns of input and gradients alone.
-    pub fn backward<T: Scalar>(
+    pub fn backward<'a, T: Scalar>(
         &self,
-        parameters: &[T],
-        input: &DMatrix<T>,
-        tape: &mut Tape<T>,
-        gradient: Option<&mut [T]>,
-        input_gradient: Option<&mut DMatrix<T>>,
-    ) {
-        let below = input_gradient.map(|gradient| (gradient.as_mut_slice(), Update::Replace));
-        self.run_back(input, tape, gradient, below, |layer, out, delta, update| {
-            product(out, self.layers[layer].weights(parameters).transposed(), delta, update);
-        });
-    }
-
-    /// As [`Mlp::backward`], with the parameters' [`Mlp::pack_transposed`]; the gradient
-    /// with respect to the input is multiplied by `slopes`, entry by entry.
-    pub fn backward_packed<T: Scalar>(
-        &self,
-        transposes: &[Packed<T>],
-        input: &DMatrix<T>,
-        tape: &mut Tape<T>,
-        gradient: &mut [T],
-        (input_gradient, slopes): (&mut DMatrix<T>, &DMatrix<T>),
-    ) {
-        let below = (input_gradient.as_mut_slice(), Update::Times(slopes.as_slice()));
-        self.run_back(input, tape, Some(gradient), Some(below), |layer, out, delta, update| {
-            transposes[layer].multiply(out, delta, update);
-        });
-    }
-
-    /// A backward pass; `multiply` writes the product of a layer's transposed weights and its delta.
-    fn run_back<T: Scalar>(
-        &self,
+        weights: impl Into<Weights<'a, T>>,
         input: &DMatrix<T>,
         tape: &mut Tape<T>,
         mut gradient: Option<&mut [T]>,
-        mut input_gradient: Option<(&mut [T], Update<'_, T>)>,
-        multiply: impl Fn(usize, &mut [T], Operand<'_, T>, Update<'_, T>),
+        mut input_gradient: Option<(&mut DMatrix<T>, Update<'_, T>)>,
     ) {
+        let weights = weights.into();
         let columns = tape.columns;
         if let (Some(_), Some(delta), Some(slopes)) = (self.output, tape.deltas.last_mut(), tape.slopes.last()) {
             scale(delta, slopes, columns);
@@ -156,12 +96,12 @@ impl Mlp {
                 layer.add_gradient(gradient, delta, Operand::leading(input, columns));
             }
             let below = match before.last_mut() {
-                Some(below) => Some((below.as_mut_slice(), Update::Times(tape.slopes[index - 1].as_slice()))),
+                Some(below) => Some((below, Update::Times(tape.slopes[index - 1].as_slice()))),
                 None => input_gradient.take(),
             };
             if let Some((out, update)) = below {
                 let len = layer.inputs * columns;
-                multiply(index, &mut out[..len], delta, update.within(..len));
+                weights.multiply_transposed(layer, &mut out.as_mut_slice()[..len], delta, update.within(..len));
             }
         }
     }
@@ -180,16 +120,6 @@ impl Linear {
         let bound = 1.0 / (self.inputs as f64).sqrt();
         for (parameter, draw) in parameters[self.offset..self.end()].iter_mut().zip(draws) {
             *parameter = T::of(bound * (2.0 * draw - 1.0));
-        }
-    }
-}
-
-/// Copies the matrices, into the memory of the copies before them where there are some.
-fn pack<'a, T: Scalar>(matrices: impl Iterator<Item = Operand<'a, T>>, packed: &mut Vec<Packed<T>>) {
-    for (index, matrix) in matrices.enumerate() {
-        match packed.get_mut(index) {
-            Some(packed) => packed.set(matrix),
-            None => packed.push(Packed::new(matrix)),
         }
     }
 }

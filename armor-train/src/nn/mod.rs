@@ -16,15 +16,17 @@ mod product;
 mod scalar;
 mod sinusoid;
 mod tape;
+mod weights;
 
 pub use activation::Activation;
 pub use adam::Adam;
 pub use linear::Linear;
 pub use mlp::Mlp;
-pub use product::{Operand, Packed, Update, product};
+pub use product::{Operand, Update, product};
 pub use scalar::Scalar;
 pub use sinusoid::{Frequencies, TimeFrequencies, sinusoidal_code};
 pub use tape::{Tape, keep_columns};
+pub use weights::{Panels, Passes, Weights};
 
 /// `target <- rate * online + (1 - rate) * target` (Appendix B, tau).
 pub fn soft_update<T: Scalar>(target: &mut [T], online: &[T], rate: T) {

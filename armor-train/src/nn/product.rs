@@ -107,7 +107,7 @@ impl<T> Update<'_, T> {
 
 /// A left factor of many products, copied into the order in which they read it.
 #[derive(Clone, Debug)]
-pub struct Packed<T> {
+pub(super) struct Packed<T> {
     rows: usize,
     depth: usize,
     /// Panels of [`ROWS`] rows, one after the other; in a panel the columns follow each other.
@@ -116,20 +116,13 @@ pub struct Packed<T> {
 
 impl<T: Scalar> Packed<T> {
     /// A copy of `matrix`.
-    pub fn new(matrix: Operand<'_, T>) -> Self {
-        let mut packed = Self { rows: 0, depth: 0, panels: Vec::new() };
-        packed.set(matrix);
-        packed
-    }
-
-    /// Replaces the copy by one of `matrix`, in the same memory.
-    pub fn set(&mut self, matrix: Operand<'_, T>) {
-        (self.rows, self.depth) = (matrix.rows(), matrix.columns());
-        self.panels.clear();
-        self.panels.reserve(self.rows.div_ceil(ROWS) * self.depth);
-        for first in (0..self.rows).step_by(ROWS) {
-            append_panel(&mut self.panels, matrix, first);
+    pub(super) fn new(matrix: Operand<'_, T>) -> Self {
+        let (rows, depth) = (matrix.rows(), matrix.columns());
+        let mut panels = Vec::with_capacity(rows.div_ceil(ROWS) * depth);
+        for first in (0..rows).step_by(ROWS) {
+            append_panel(&mut panels, matrix, first);
         }
+        Self { rows, depth, panels }
     }
 
     #[cfg(test)]
@@ -141,7 +134,7 @@ impl<T: Scalar> Packed<T> {
     ///
     /// # Panics
     /// Unless the dimensions fit.
-    pub fn multiply(&self, out: &mut [T], b: Operand<'_, T>, update: Update<'_, T>) {
+    pub(super) fn multiply(&self, out: &mut [T], b: Operand<'_, T>, update: Update<'_, T>) {
         check(out, [self.rows, self.depth], b, update);
         T::multiply(out, self.rows, &self.panels, b, update);
     }

@@ -28,6 +28,12 @@ impl<T: Scalar> Tape<T> {
         self.deltas.last_mut().expect("an Mlp has a layer")
     }
 
+    /// [`Tape::output`] and [`Tape::output_gradient`].
+    pub fn output_with_gradient(&mut self) -> (&DMatrix<T>, &mut DMatrix<T>) {
+        let gradient = self.deltas.last_mut().expect("an Mlp has a layer");
+        (self.values.last().expect("an Mlp has a layer"), gradient)
+    }
+
     /// Frees the room of the gradients; [`Tape::swap_gradients`] gives it another.
     pub fn free_gradients(&mut self) {
         self.deltas.clear();

@@ -158,6 +158,15 @@ unsafe fn tiles<const UPDATE: u8, const P: usize, const C: usize>(
         for (third, pointer) in thirds.iter_mut().enumerate() {
             *pointer = pointer.wrapping_add(3 * third * across);
         }
+        if UPDATE != REPLACE {
+            // What the sums are joined with comes from afar while they are computed.
+            for column in 0..C {
+                for panel in 0..P {
+                    let place = (at + column) * left.rows + first + panel * ROWS;
+                    _mm_prefetch::<_MM_HINT_T0>(target.other.wrapping_add(place).cast());
+                }
+            }
+        }
         for _ in 0..left.depth {
             let mut rows = [_mm512_setzero_ps(); P];
             for panel in 0..P {

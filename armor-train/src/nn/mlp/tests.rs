@@ -17,7 +17,7 @@ fn check(activation: Activation, output: Option<Activation>) {
     let mut input_gradient = DMatrix::zeros(3, 6);
     mlp.forward(&parameters, &input, &mut tape, true);
     tape.output_gradient().copy_from(&seed);
-    mlp.backward(&parameters, &input, &mut tape, Some(&mut gradient), Some(&mut input_gradient));
+    mlp.backward(&parameters, &input, &mut tape, Some(&mut gradient), Some((&mut input_gradient, Update::Replace)));
 
     assert_gradient(&parameters, &gradient, |parameters| loss(parameters, &input));
     assert_gradient(input.as_slice(), input_gradient.as_slice(), |values| {

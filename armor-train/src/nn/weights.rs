@@ -1,0 +1,114 @@
+//! The parameters of a network as its passes read them.
+
+use rayon::prelude::*;
+
+use super::product::{Operand, Packed, Update, product};
+use super::{Linear, Scalar};
+
+/// The passes that a copy of weights serves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Passes {
+    /// Forward passes alone.
+    Forward,
+    /// Forward and backward passes.
+    Both,
+}
+
+/// Parameters with copies of some layers' weights, in the order in which products read them;
+/// made once for all shares of a batch.
+#[derive(Debug)]
+pub struct Panels<'a, T> {
+    parameters: &'a [T],
+    /// Ascending by offset.
+    layers: Vec<LayerPanels<T>>,
+}
+
+/// The weights of a layer.
+#[derive(Debug)]
+struct LayerPanels<T> {
+    /// Index of the layer's first weight among the parameters.
+    offset: usize,
+    weights: Packed<T>,
+    /// Where a backward pass may follow.
+    transposed: Option<Packed<T>>,
+}
+
+impl<'a, T: Scalar> Panels<'a, T> {
+    /// Copies the weights of `layers`, which ascend by offset, for `passes`.
+    pub fn new<'l>(layers: impl Iterator<Item = &'l Linear>, parameters: &'a [T], passes: Passes) -> Self {
+        let layers: Vec<&Linear> = layers.collect();
+        let copy = |layer: &&Linear| {
+            let weights = layer.weights(parameters);
+            let transposed = (passes == Passes::Both).then(|| Packed::new(weights.transposed()));
+            LayerPanels { offset: layer.offset, weights: Packed::new(weights), transposed }
+        };
+        Self { parameters, layers: layers.par_iter().map(copy).collect() }
+    }
+}
+
+/// Parameters to be read, and the copies of weights that there are.
+#[derive(Debug)]
+pub struct Weights<'a, T> {
+    parameters: &'a [T],
+    layers: &'a [LayerPanels<T>],
+}
+
+impl<T> Clone for Weights<'_, T> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<T> Copy for Weights<'_, T> {}
+
+impl<'a, T> From<&'a [T]> for Weights<'a, T> {
+    fn from(parameters: &'a [T]) -> Self {
+        Self { parameters, layers: &[] }
+    }
+}
+
+impl<'a, T> From<&'a Vec<T>> for Weights<'a, T> {
+    fn from(parameters: &'a Vec<T>) -> Self {
+        parameters.as_slice().into()
+    }
+}
+
+impl<'a, T> From<&'a Panels<'_, T>> for Weights<'a, T> {
+    fn from(panels: &'a Panels<'_, T>) -> Self {
+        Self { parameters: panels.parameters, layers: &panels.layers }
+    }
+}
+
+impl<'a, T: Scalar> Weights<'a, T> {
+    /// All parameters of the network.
+    pub const fn parameters(self) -> &'a [T] {
+        self.parameters
+    }
+
+    /// Writes `W input` to `out`, column by column.
+    pub(super) fn multiply(self, layer: &Linear, out: &mut [T], input: Operand<'_, T>, update: Update<'_, T>) {
+        match self.panels(layer) {
+            Some(panels) => panels.weights.multiply(out, input, update),
+            None => product(out, layer.weights(self.parameters), input, update),
+        }
+    }
+
+    /// Writes `W^T delta` to `out`, column by column.
+    pub(super) fn multiply_transposed(
+        self,
+        layer: &Linear,
+        out: &mut [T],
+        delta: Operand<'_, T>,
+        update: Update<'_, T>,
+    ) {
+        match self.panels(layer).and_then(|panels| panels.transposed.as_ref()) {
+            Some(transposed) => transposed.multiply(out, delta, update),
+            None => product(out, layer.weights(self.parameters).transposed(), delta, update),
+        }
+    }
+
+    fn panels(self, layer: &Linear) -> Option<&'a LayerPanels<T>> {
+        let place = self.layers.binary_search_by_key(&layer.offset, |panels| panels.offset).ok()?;
+        Some(&self.layers[place])
+    }
+}
