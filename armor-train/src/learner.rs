@@ -117,8 +117,8 @@ impl<'d, T: Scalar> Learner<'d, T> {
     pub fn resume(config: Config, data: &'d Dataset, state: LearnerState<T>) -> Self {
         let model = Model::new(&config, data.state_dim(), data.action_dim());
         let shares = (0..config.batch).step_by(SHARE);
-        let chains = Arc::default();
-        let worker = |first| Worker::new(&model, first, SHARE.min(config.batch - first), Arc::clone(&chains));
+        let rooms = Arc::default();
+        let worker = |first| Worker::new(&model, first, SHARE.min(config.batch - first), Arc::clone(&rooms));
         let workers = shares.map(worker).collect();
         let mut reweighting = Reweighting::new(&config, data);
         if reweighting.refreshes(state.step) > 0 {

@@ -34,6 +34,7 @@ pub mod normaliser;
 pub mod onnx;
 pub mod pcgrad;
 pub mod phase;
+pub mod pool;
 pub mod quantize;
 pub mod report;
 pub mod reweight;

@@ -4,24 +4,26 @@
 //! threads, and gradients are added in the order of the workers: results do not
 //! depend on the number of threads.
 
+mod judging;
+
 use std::sync::Arc;
 
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use crate::actor::chain::{Chain, Draw};
-use crate::actor::chains::Chains;
-use crate::actor::denoiser::Context;
 use crate::actor::{ActorLoss, ActorNoise, ActorTape, Judges};
 use crate::batch::Batch;
+use crate::critic::Task;
 use crate::critic::bootstrap::InSample;
-use crate::critic::{CriticTape, Task, bellman_target};
 use crate::model::{Model, Optimisers, Parameters};
 use crate::nn::{Passes, Scalar, Weights, accumulate, clip_norm, soft_update};
 use crate::pcgrad::{self, Order, Surgery};
+use crate::pool::Pool;
+use judging::{Judgement, Networks};
 
 /// A share of the batch, and room for everything that is computed from it.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Worker<T: Scalar> {
     /// Place of the share's first sample in the batch.
     pub first: usize,
@@ -33,21 +35,27 @@ pub struct Worker<T: Scalar> {
     pub cloning: DMatrix<T>,
     /// Whether the second of the critic's twins judges the actor, where that is random.
     pub second_twin: bool,
-    next_context: Context<T>,
-    next_chain: Chain<T>,
-    target_tape: CriticTape<T>,
-    critic_tape: CriticTape<T>,
+    rooms: Arc<Rooms<T>>,
     /// Where targets bootstrap from state values.
     in_sample: Option<InSample<T>>,
-    targets: Vec<T>,
-    /// Gradient of the heads; its trunk part stays zero.
-    critic_gradient: Vec<T>,
-    trunk_gradients: [Vec<T>; 3],
-    critic_losses: [f64; 3],
+    judgement: Judgement<T>,
     actor_tape: ActorTape<T>,
     actor_gradient: Vec<T>,
     dual_gradient: Vec<T>,
     actor_loss: ActorLoss,
+}
+
+/// Room that all shares of a batch have in common.
+#[derive(Debug)]
+pub struct Rooms<T: Scalar> {
+    judging: Pool<judging::Room<T>>,
+    chains: Arc<Pool<Chain<T>>>,
+}
+
+impl<T: Scalar> Default for Rooms<T> {
+    fn default() -> Self {
+        Self { judging: Pool::default(), chains: Arc::default() }
+    }
 }
 
 /// What the critic's update measured, means over the batch.
@@ -62,8 +70,8 @@ pub struct CriticMetrics {
 }
 
 impl<T: Scalar> Worker<T> {
-    /// Room for a share of `samples` samples from place `first` on, and `chains` that all shares have in common.
-    pub fn new(model: &Model, first: usize, samples: usize, chains: Arc<Chains<T>>) -> Self {
+    /// Room for a share of `samples` samples from place `first` on, and `rooms` that all shares have in common.
+    pub fn new(model: &Model, first: usize, samples: usize, rooms: Arc<Rooms<T>>) -> Self {
         let denoiser = &model.actor.denoiser;
         let (state, action) = (denoiser.widths().state, denoiser.widths().action);
         Self {
@@ -72,19 +80,13 @@ impl<T: Scalar> Worker<T> {
             levels: vec![1; samples],
             cloning: DMatrix::zeros(action, samples),
             second_twin: false,
-            next_context: denoiser.context(samples),
-            next_chain: Chain::new(denoiser, model.target_chain.clone(), samples, 0),
-            target_tape: model.critic.tape(samples),
-            critic_tape: model.critic.tape(samples),
             in_sample: model.state_value.as_ref().map(|value| InSample::new(value, samples)),
-            targets: Vec::with_capacity(samples),
-            critic_gradient: vec![T::zero(); model.critic.size()],
-            trunk_gradients: [(); 3].map(|()| vec![T::zero(); model.critic.trunk_size()]),
-            critic_losses: [0.0; 3],
-            actor_tape: model.actor.tape(&model.critic, &model.dual, samples, chains),
+            judgement: Judgement::new(model, samples),
+            actor_tape: model.actor.tape(&model.critic, &model.dual, samples, Arc::clone(&rooms.chains)),
             actor_gradient: vec![T::zero(); denoiser.size()],
             dual_gradient: vec![T::zero(); model.dual.size()],
             actor_loss: ActorLoss::default(),
+            rooms,
         }
     }
 
@@ -105,41 +107,17 @@ impl<T: Scalar> Worker<T> {
 
     /// The critic's pessimistic values of a task at the recorded actions, before its last update.
     pub fn recorded_values(&self, task: Task) -> impl Iterator<Item = T> {
-        self.critic_tape.pessimistic(task)
+        self.judgement.recorded[task as usize].iter().copied()
     }
 
     /// Eqs. 3 and 4: targets, losses and the gradient of each task.
-    fn judge(&mut self, model: &Model, networks: Judging<'_, T>, batch_len: usize, draw: &Draw<'_, T>) {
-        let Self { batch, target_tape, critic_tape, in_sample, targets, .. } = self;
-        let critic = &model.critic;
-        let recorded = (&batch.state, &batch.kappa[..], &batch.action);
-        if let (Some(in_sample), Some(value)) = (&mut *in_sample, &model.state_value) {
-            critic.forward(networks.target, &Task::ALL, recorded, target_tape, false);
-            in_sample.regress((value, networks.state_value), (batch, batch_len), target_tape);
-        } else {
-            let (first, denoiser) = (self.first, &model.actor.denoiser);
-            denoiser.prepare(networks.actor, &batch.next_state, &batch.next_kappa, &mut self.next_context);
-            let draw = |stage: usize, sample: usize, out: &mut [T]| draw(stage, first + sample, out);
-            self.next_chain.run(denoiser, networks.actor, &self.next_context, &draw);
-            let next = (&batch.next_state, &batch.next_kappa[..], &self.next_chain.action);
-            critic.forward(networks.target, &Task::ALL, next, target_tape, false);
-        }
-        critic.forward(networks.critic, &Task::ALL, recorded, critic_tape, true);
-
-        self.critic_gradient.fill(T::zero());
-        for (index, task) in Task::ALL.into_iter().enumerate() {
-            let signal = if task == Task::Reward { &batch.reward } else { &batch.cost };
-            let discount = model.discounts[index];
-            match in_sample {
-                Some(value) => bellman_target(signal, &batch.alive, discount, value.next_values(task), targets),
-                None => bellman_target(signal, &batch.alive, discount, target_tape.pessimistic(task), targets),
-            }
-            let trunk_gradient = &mut self.trunk_gradients[index];
-            trunk_gradient.fill(T::zero());
-            let gradients = (&mut self.critic_gradient[..], &mut trunk_gradient[..]);
-            self.critic_losses[index] =
-                critic.backward_td(networks.critic, task, targets, batch_len, critic_tape, gradients);
-        }
+    fn judge(&mut self, model: &Model, networks: Networks<'_, T>, batch_len: usize, draw: &Draw<'_, T>) {
+        let (first, samples) = (self.first, self.batch.samples());
+        let draw = |stage: usize, sample: usize, out: &mut [T]| draw(stage, first + sample, out);
+        let mut room = self.rooms.judging.lend(samples, || judging::Room::new(model, samples));
+        let batch = (&self.batch, batch_len);
+        self.judgement.judge((model, networks), batch, &draw, &mut self.in_sample, &mut room);
+        self.rooms.judging.give_back(samples, room);
     }
 
     /// The terms of Eqs. 13, 15 and 16.
@@ -194,16 +172,6 @@ impl<T: Scalar> Worker<T> {
     }
 }
 
-/// The networks of the critic's update.
-#[derive(Clone, Copy)]
-struct Judging<'a, T> {
-    /// The actor that draws the next actions.
-    actor: Weights<'a, T>,
-    target: Weights<'a, T>,
-    critic: Weights<'a, T>,
-    state_value: Weights<'a, T>,
-}
-
 /// Updates the critic: Eqs. 3 and 4 in every share, Eq. 5 on the trunk, one step of Adam;
 /// and the state values, where targets bootstrap from them.
 ///
@@ -225,7 +193,7 @@ pub fn update_critic<T: Scalar>(
         let value_panels = model.state_value.as_ref().map(|value| value.pack(&parameters.state_value, Passes::Both));
         let target = model.critic.pack(&parameters.target, Passes::Forward);
         let critic = model.critic.pack(&parameters.critic, Passes::Both);
-        let networks = Judging {
+        let networks = Networks {
             actor: actor_panels.as_ref().map_or(actor.into(), Weights::from),
             target: (&target).into(),
             critic: (&critic).into(),
@@ -239,11 +207,11 @@ pub fn update_critic<T: Scalar>(
     let mut value_gradient = vec![T::zero(); parameters.state_value.len()];
     let mut metrics = CriticMetrics::default();
     for worker in workers {
-        accumulate(&mut gradient, &worker.critic_gradient);
-        for (sum, part) in trunk.iter_mut().zip(&worker.trunk_gradients) {
+        accumulate(&mut gradient, &worker.judgement.gradient);
+        for (sum, part) in trunk.iter_mut().zip(&worker.judgement.trunk_gradients) {
             accumulate(sum, part);
         }
-        for (sum, part) in metrics.losses.iter_mut().zip(worker.critic_losses) {
+        for (sum, part) in metrics.losses.iter_mut().zip(worker.judgement.losses) {
             *sum += part / batch_len as f64;
         }
         if let Some(in_sample) = &worker.in_sample {

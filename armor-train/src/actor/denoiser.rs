@@ -294,24 +294,16 @@ impl Denoiser {
         let weights = weights.into();
         call.kept.clear();
         call.kept.extend(0..call.action.ncols());
+        let hidden = call.hidden.as_mut_slice();
         if self.sees_action {
             let [of_action, ..] = self.blocks();
-            let (hidden, constant) = (call.hidden.as_mut_slice(), context.constant.as_slice());
-            product(
-                hidden,
-                self.first.block(weights.parameters(), of_action),
-                (&call.action).into(),
-                Update::Plus(constant),
-            );
+            let of_action = self.first.block(weights.parameters(), of_action);
+            product(hidden, of_action, (&call.action).into(), Update::Plus(context.constant.as_slice()));
         } else {
-            call.hidden.copy_from(&context.constant);
+            hidden.copy_from_slice(context.constant.as_slice());
         }
-        Activation::Mish.apply_by_level(
-            &mut call.hidden,
-            slopes.then_some(&mut call.hidden_slope),
-            &context.table,
-            &call.levels,
-        );
+        let slopes_of = slopes.then(|| call.hidden_slope.as_mut_slice());
+        Activation::Mish.apply_by_level(hidden, slopes_of, &context.table, &call.levels);
         self.body.forward(weights, &call.hidden, &mut call.body, slopes);
     }
 

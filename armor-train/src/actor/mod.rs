@@ -6,7 +6,6 @@
 //! ```
 
 pub mod chain;
-pub mod chains;
 pub mod denoiser;
 mod guidance;
 mod process;
@@ -21,8 +20,8 @@ use crate::batch::Batch;
 use crate::critic::{Critic, CriticTape, Pick, Task, Twins};
 use crate::dual::{Dual, DualTape};
 use crate::nn::{Scalar, Weights};
+use crate::pool::Pool;
 use chain::{Chain, Draw, clip, coefficients};
-use chains::Chains;
 use denoiser::{Call, Context, Denoiser};
 
 pub use guidance::{CloningNorm, Guidance};
@@ -70,7 +69,7 @@ pub struct ActorTape<T: Scalar> {
     call: Call<T>,
     /// Lent from the forward to the backward pass.
     chain: Option<Chain<T>>,
-    chains: Arc<Chains<T>>,
+    chains: Arc<Pool<Chain<T>>>,
     /// Whether the one-step estimate lay within the bounds, `A x B`.
     inside: DMatrix<T>,
     critic: CriticTape<T>,
@@ -178,7 +177,7 @@ impl Actor {
         critic: &Critic,
         dual: &Dual,
         samples: usize,
-        chains: Arc<Chains<T>>,
+        chains: Arc<Pool<Chain<T>>>,
     ) -> ActorTape<T> {
         let action = || DMatrix::zeros(self.denoiser.widths().action, samples);
         ActorTape {
@@ -353,7 +352,7 @@ impl Actor {
             PolicyGradient::Full | PolicyGradient::LastK => {
                 if let Some(mut chain) = chain.take() {
                     chain.backward(&self.denoiser, weights, context, action_gradient, gradient);
-                    chains.give_back(chain);
+                    chains.give_back(chain.action.ncols(), chain);
                 }
             }
             PolicyGradient::OneStep => {

@@ -17,17 +17,17 @@ pub enum Activation {
 }
 
 impl Activation {
-    /// Adds `bias` to each column of `values`, then applies the function in
+    /// Adds `bias` to each column of `values`, as long as it, then applies the function in
     /// place; where `slopes` are given, writes the derivative to them.
-    pub fn apply<T: Scalar>(self, values: &mut DMatrix<T>, slopes: Option<&mut DMatrix<T>>, bias: &[T]) {
+    pub fn apply<T: Scalar>(self, values: &mut [T], slopes: Option<&mut [T]>, bias: &[T]) {
         self.apply_columns(values, slopes, bias.len(), std::iter::repeat(bias));
     }
 
     /// As [`Activation::apply`], with a bias for each column: that of its noise level, column `n - 1` of `table`.
     pub fn apply_by_level<T: Scalar>(
         self,
-        values: &mut DMatrix<T>,
-        slopes: Option<&mut DMatrix<T>>,
+        values: &mut [T],
+        slopes: Option<&mut [T]>,
         table: &DMatrix<T>,
         levels: &[usize],
     ) {
@@ -38,19 +38,19 @@ impl Activation {
 
     fn apply_columns<'a, T: Scalar>(
         self,
-        values: &mut DMatrix<T>,
-        slopes: Option<&mut DMatrix<T>>,
+        values: &mut [T],
+        slopes: Option<&mut [T]>,
         rows: usize,
         biases: impl Iterator<Item = &'a [T]>,
     ) {
-        let columns = values.as_mut_slice().chunks_exact_mut(rows).zip(biases);
+        let columns = values.chunks_exact_mut(rows).zip(biases);
         match (self, slopes) {
             (Self::Mish, None) => columns.for_each(|(values, bias)| T::mish_column(values, bias)),
             (Self::Mish, Some(slopes)) => columns
-                .zip(slopes.as_mut_slice().chunks_exact_mut(rows))
+                .zip(slopes.chunks_exact_mut(rows))
                 .for_each(|((values, bias), slopes)| T::mish_column_with_slopes(values, slopes, bias)),
             (Self::Softplus, slopes) => {
-                let mut slopes = slopes.map(|slopes| slopes.as_mut_slice().iter_mut());
+                let mut slopes = slopes.map(|slopes| slopes.iter_mut());
                 for (values, bias) in columns {
                     for (value, &bias) in values.iter_mut().zip(bias) {
                         let sum = *value + bias;
@@ -68,7 +68,7 @@ impl Activation {
                 values.iter_mut().zip(bias).for_each(|(value, &bias)| *value = (*value + bias).max(T::zero()));
             }),
             (Self::Relu, Some(slopes)) => {
-                for ((values, bias), slopes) in columns.zip(slopes.as_mut_slice().chunks_exact_mut(rows)) {
+                for ((values, bias), slopes) in columns.zip(slopes.chunks_exact_mut(rows)) {
                     for ((value, slope), &bias) in values.iter_mut().zip(slopes).zip(bias) {
                         let sum = *value + bias;
                         (*value, *slope) = if sum > T::zero() { (sum, T::one()) } else { (T::zero(), T::zero()) };

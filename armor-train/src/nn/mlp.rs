@@ -60,11 +60,11 @@ impl Mlp {
         for (index, layer) in self.layers.iter().enumerate() {
             let (before, rest) = tape.values.split_at_mut(index);
             let input = before.last().unwrap_or(input);
-            let values = &mut rest[0];
-            weights.multiply(layer, values.as_mut_slice(), input.into(), Update::Replace);
+            let values = rest[0].as_mut_slice();
+            weights.multiply(layer, values, input.into(), Update::Replace);
             let bias = layer.bias(weights.parameters());
             match self.activation(index) {
-                Some(activation) => activation.apply(values, slopes.then_some(&mut tape.slopes[index]), bias),
+                Some(activation) => activation.apply(values, slopes.then(|| tape.slopes[index].as_mut_slice()), bias),
                 None => add_bias(values, bias),
             }
         }
@@ -132,8 +132,8 @@ fn scale<T: Scalar>(delta: &mut DMatrix<T>, slopes: &DMatrix<T>, columns: usize)
     }
 }
 
-fn add_bias<T: Scalar>(values: &mut DMatrix<T>, bias: &[T]) {
-    for column in values.as_mut_slice().chunks_exact_mut(bias.len()) {
+fn add_bias<T: Scalar>(values: &mut [T], bias: &[T]) {
+    for column in values.chunks_exact_mut(bias.len()) {
         for (value, &bias) in column.iter_mut().zip(bias) {
             *value += bias;
         }

@@ -18,9 +18,9 @@ fn config(options: &[&str]) -> Config {
 
 /// A batch of `SAMPLES` random transitions in two shares.
 fn workers(model: &Model) -> Vec<Worker<f64>> {
-    let chains = Arc::default();
+    let rooms = Arc::default();
     let share = |first: usize| {
-        let mut worker = Worker::new(model, first, SAMPLES / 2, Arc::clone(&chains));
+        let mut worker = Worker::new(model, first, SAMPLES / 2, Arc::clone(&rooms));
         let stream = 20 * first as u32;
         worker.batch.state = DMatrix::from_vec(3, 3, fill(9, stream + 1));
         worker.batch.next_state = DMatrix::from_vec(3, 3, fill(9, stream + 2));
