@@ -12,39 +12,19 @@ mod options;
 
 pub mod bootstrap;
 mod expectile;
+mod tape;
+mod task;
 mod twins;
 pub mod value;
 
 use nalgebra::DMatrix;
 
-use crate::nn::{Activation, Mlp, Panels, Passes, Scalar, Tape, Update, Weights};
+use crate::nn::{Activation, Mlp, Panels, Passes, Scalar, Update, Weights};
 
 pub use options::{CostHeads, CostOutput, CriticOptions, Trunk, TwinLoss};
+pub use tape::CriticTape;
+pub use task::Task;
 pub use twins::{Pick, Twins};
-
-/// What a pair of heads estimates.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Task {
-    /// Discounted reward, `Q_r`.
-    Reward,
-    /// Long-term cost, `Q_cL`.
-    LongCost,
-    /// Short-term cost, `Q_cS`.
-    ShortCost,
-}
-
-impl Task {
-    /// All tasks, in the order of their heads.
-    pub const ALL: [Self; 3] = [Self::Reward, Self::LongCost, Self::ShortCost];
-
-    /// Whether the twin `a` is the more pessimistic one: the smaller reward, the larger cost.
-    fn is_worse<T: Scalar>(self, a: T, b: T) -> bool {
-        match self {
-            Self::Reward => a <= b,
-            Self::LongCost | Self::ShortCost => a >= b,
-        }
-    }
-}
 
 /// Layout of the critic within its parameters: trunks, then heads `r1 r2 L1 L2 S1 S2`.
 #[derive(Clone, Debug)]
@@ -57,17 +37,6 @@ pub struct Critic {
     trunks: Vec<Mlp>,
     /// The twins of each estimate.
     heads: Vec<[Mlp; 2]>,
-}
-
-/// What a forward pass leaves behind; reused from step to step.
-#[derive(Clone, Debug)]
-pub struct CriticTape<T: Scalar> {
-    options: CriticOptions,
-    input: DMatrix<T>,
-    trunks: Vec<Tape<T>>,
-    heads: Vec<[Tape<T>; 2]>,
-    /// Gradient with respect to the input.
-    input_gradient: DMatrix<T>,
 }
 
 impl Critic {
@@ -239,21 +208,6 @@ impl Critic {
             trunk.backward(weights, &tape.input, trunk_tape, None, Some(below));
             *action_gradient += tape.input_gradient.rows(self.state + 1, self.action);
         }
-    }
-}
-
-impl<T: Scalar> CriticTape<T> {
-    /// The pessimistic twin of a task from the last forward pass: the minimum
-    /// of rewards, the maximum of costs.
-    pub fn pessimistic(&self, task: Task) -> impl Iterator<Item = T> {
-        self.values(task, Pick::PESSIMISTIC)
-    }
-
-    /// What `pick` makes of the twins of a task from the last forward pass.
-    pub fn values(&self, task: Task, pick: Pick) -> impl Iterator<Item = T> {
-        let [one, two] = &self.heads[self.options.head_of(task)];
-        let twins = one.output().iter().zip(two.output().iter());
-        twins.map(move |(&one, &two)| pick.value(task, [one, two]))
     }
 }
 

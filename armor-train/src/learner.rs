@@ -1,32 +1,34 @@
 //! The algorithm: one training step of ARMOR, top to bottom.
 
+mod gather;
+mod judgement;
+mod state;
+
 use std::sync::Arc;
 
-use armor_core::noise::{Noise, below, uniform};
-use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
+use armor_core::noise::Noise;
 
 use crate::actor::ActorLoss;
 use crate::config::Config;
 use crate::critic::Task;
 use crate::data::Dataset;
 use crate::extraction::Extraction;
-use crate::extraction::advantage::{Advantages, Judges};
+use crate::extraction::advantage::Advantages;
 use crate::extraction::cloning::Cloning;
-use crate::extraction::condition::Condition;
-use crate::extraction::risk;
 use crate::extraction::weight::{self, BatchWeights};
-use crate::model::{ActorCopy, Model, Optimisers, Parameters};
+use crate::model::{ActorCopy, Model, Optimisers};
 use crate::nn::{Scalar, dot, soft_update};
 use crate::normaliser::Normaliser;
 use crate::pcgrad::{self, Order};
 use crate::phase::Phase;
-use crate::reweight::{self, Reweighting, WeightMean, Weights};
+use crate::reweight::{Reweighting, Weights};
 use crate::sampling::Rows;
 use crate::selection::{Choice, Selection};
 use crate::source::Source;
 use crate::stream;
 use crate::update::{CriticMetrics, Worker, update_actor, update_critic, update_imitation, update_target};
+
+pub use state::LearnerState;
 
 /// Samples of a worker's share. A constant, so that the shares, and with them
 /// the order of all sums, do not depend on the machine; a multiple of the
@@ -48,34 +50,6 @@ pub struct Learner<'d, T: Scalar> {
     cloning: Option<Cloning>,
     state: LearnerState<T>,
     workers: Vec<Worker<T>>,
-}
-
-/// All that changes from step to step: what a checkpoint holds.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(bound = "")]
-pub struct LearnerState<T: Scalar> {
-    /// Training steps done.
-    pub step: u64,
-    /// The networks.
-    pub parameters: Parameters<T>,
-    /// Their optimisers.
-    pub optimisers: Optimisers<T>,
-    /// `w_cf` of each transition, or `w` where that is averaged; all 1 before the first refresh.
-    pub counterfactual: Vec<f32>,
-    /// Share of the transitions that the last refresh raised.
-    pub counterfactual_active: f64,
-    /// The actor with the smallest cloning loss so far; none where the last one flies.
-    pub selection: Selection<T>,
-}
-
-impl<T: Scalar> LearnerState<T> {
-    /// The actor's weights that fly: those that were chosen, else their moving average, where one is kept.
-    pub fn flying_actor(&self) -> &[T] {
-        match &self.selection.actor[..] {
-            [] => self.parameters.actor_copy(ActorCopy::Average),
-            chosen => chosen,
-        }
-    }
 }
 
 /// What one training step measured.
@@ -201,23 +175,6 @@ impl<'d, T: Scalar> Learner<'d, T> {
         metrics
     }
 
-    /// Judges all transitions, where the actor clones by their advantages.
-    pub(crate) fn judge_data(&self) -> Option<Cloning> {
-        let value = self.model.state_value.as_ref().filter(|_| self.config.extraction == Extraction::Weighted)?;
-        let parameters = &self.state.parameters;
-        let judges = Judges {
-            critic: (&self.model.critic, &parameters.target[..]),
-            value: (value, &parameters.state_value[..]),
-        };
-        let source = Source::new(&self.config, self.data, &self.normaliser);
-        let cloning = Cloning::new(&self.config, Advantages::new(&source, judges, self.config.traces()));
-        let share = self.config.safest_share;
-        if share == 1.0 {
-            return Some(cloning);
-        }
-        Some(cloning.following(Rows::among(risk::safest(&source, judges.value, (share, self.config.limit)))))
-    }
-
     /// Looks at the cloning loss of a step, where it decides which actor flies. Losses before
     /// the weights are in use are of another data set.
     fn select(&mut self, metrics: &Metrics) {
@@ -225,59 +182,6 @@ impl<'d, T: Scalar> Learner<'d, T> {
         if self.reweighting.is_in_use(self.state.step) {
             let LearnerState { parameters, selection, .. } = &mut self.state;
             selection.push(actor.cloning, parameters.actor_copy(ActorCopy::Average));
-        }
-    }
-
-    /// Draws a batch of transitions with replacement, and the noise of behaviour cloning.
-    ///
-    /// Weights are those of Eq. 10; where there are advantages, their logarithm plus that of the advantage weight.
-    fn gather(&mut self) {
-        let (step, noise, batch) = (self.state.step, self.noise, self.config.batch as u64);
-        let levels = self.config.diffusion_steps as u32;
-        let source = Source::new(&self.config, self.data, &self.normaliser);
-        let (cloning, condition) = (self.cloning.as_ref(), self.config.condition);
-        let weights = self.reweighting.weights();
-        let rows = cloning.and_then(Cloning::followed).unwrap_or(&self.rows);
-        let spread = cloning.map_or(0.0, |_| self.config.state_noise);
-        let by_batch = self.config.weight_mean == WeightMean::Batch && self.reweighting.is_in_use(step + 1);
-        let counterfactual = &self.state.counterfactual;
-        let weight = |row: usize| match by_batch {
-            true => weights.product(self.data, counterfactual, row),
-            false => f64::from(weights.combined[row]),
-        };
-        let [twin, ..] = noise.words(stream::TWINS, step, 0);
-        self.workers.par_iter_mut().for_each(|worker| {
-            worker.second_twin = twin & 1 == 1;
-            for sample in 0..worker.batch.samples() {
-                let place = worker.first + sample;
-                let tick = step * batch + place as u64;
-                let word = |stream| noise.words(stream, step, place as u32 / 4)[place % 4];
-                let row = rows.draw(word);
-                let extra = source.larger_budget(row, word(stream::BUDGET), word(stream::RELABEL));
-                source.fill(&mut worker.batch, sample, row, extra);
-                if spread > 0.0 {
-                    let mut state = worker.batch.state.column_mut(sample);
-                    stream::add_normal(noise, stream::STATE_NOISE, tick, spread, state.as_mut_slice());
-                }
-                let leniency = uniform(word(stream::LENIENCY));
-                worker.batch.weight[sample] = match cloning {
-                    None => T::of(weight(row)),
-                    Some(cloning) => T::of(weight(row).ln() + cloning.log_weight(row, f64::from(leniency))),
-                };
-                match condition {
-                    Condition::Kappa => {}
-                    Condition::Lambda => worker.batch.condition[sample] = T::of_f32(leniency),
-                    Condition::None => worker.batch.condition[sample] = T::zero(),
-                }
-                worker.levels[sample] = 1 + below(word(stream::LEVELS), levels) as usize;
-                let mut column = worker.cloning.column_mut(sample);
-                stream::fill_normal(noise, stream::CLONING, tick, column.as_mut_slice());
-            }
-        });
-        if by_batch {
-            let mut shares: Vec<&mut [T]> =
-                self.workers.iter_mut().map(|worker| &mut worker.batch.weight[..]).collect();
-            reweight::normalise(&mut shares, [self.config.weight_min, self.config.weight_max]);
         }
     }
 

@@ -25,12 +25,9 @@ impl Guidance {
         }
     }
 
-    /// The factor on `Q_r` that stands for `eta`, where the batch has `mean |Q_r| = size`.
-    pub fn factor(self, eta: f64, size: f64) -> f64 {
-        match self {
-            Self::Raw => eta,
-            Self::Normalized => eta / size.max(NO_SCALE),
-        }
+    /// The factor on `Q_r` that stands for `eta`, where that depends on `mean |Q_r| = size` of the batch.
+    pub fn normalized(eta: f64, size: f64) -> f64 {
+        eta / size.max(NO_SCALE)
     }
 }
 
@@ -61,9 +58,8 @@ mod tests {
     #[test]
     fn normalised_guidance_is_the_same_for_all_scales_of_reward() {
         for size in [0.01, 1.0, 300.0] {
-            assert!((Guidance::Normalized.factor(0.7, size) * size - 0.7).abs() < 1e-12);
-            assert_eq!(Guidance::Raw.factor(0.7, size), 0.7);
+            assert!((Guidance::normalized(0.7, size) * size - 0.7).abs() < 1e-12);
         }
-        assert!(Guidance::Normalized.factor(0.7, 0.0).is_finite());
+        assert!(Guidance::normalized(0.7, 0.0).is_finite());
     }
 }

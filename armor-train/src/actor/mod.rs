@@ -8,36 +8,28 @@
 pub mod chain;
 pub mod denoiser;
 mod guidance;
+mod improvement;
+mod loss;
 mod process;
+mod tape;
 
 use std::sync::Arc;
 
-use armor_core::schedule::Sampler;
 use nalgebra::DMatrix;
-use serde::{Deserialize, Serialize};
 
 use crate::batch::Batch;
-use crate::critic::{Critic, CriticTape, Pick, Task, Twins};
-use crate::dual::{Dual, DualTape};
+use crate::critic::{Critic, Pick, Task, Twins};
+use crate::dual::Dual;
 use crate::nn::{Scalar, Weights};
 use crate::pool::Pool;
-use chain::{Chain, Draw, clip, coefficients};
-use denoiser::{Call, Context, Denoiser};
+use chain::{Chain, Draw};
+use denoiser::Denoiser;
 
 pub use guidance::{CloningNorm, Guidance};
+pub use improvement::PolicyGradient;
+pub use loss::ActorLoss;
 pub use process::{Family, Process, ReverseVariance};
-
-/// Where the action `a_pi` of the policy improvement comes from, and how its gradient flows.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum PolicyGradient {
-    /// A sample of the full chain, with the gradient through all its steps (the paper).
-    Full,
-    /// The same sample, with the gradient through its last steps alone.
-    LastK,
-    /// The estimate `x0` from the noised data action of `L_BC`: no further call of the network.
-    OneStep,
-}
+pub use tape::ActorTape;
 
 /// The actor: its network, its schedule, and how it is improved.
 #[derive(Clone, Debug)]
@@ -62,71 +54,6 @@ pub struct Actor {
     pub twins: Twins,
 }
 
-/// What an update of the actor and the dual needs, for a share of the batch.
-#[derive(Clone, Debug)]
-pub struct ActorTape<T: Scalar> {
-    context: Context<T>,
-    call: Call<T>,
-    /// Lent from the forward to the backward pass.
-    chain: Option<Chain<T>>,
-    chains: Arc<Pool<Chain<T>>>,
-    /// Whether the one-step estimate lay within the bounds, `A x B`.
-    inside: DMatrix<T>,
-    critic: CriticTape<T>,
-    pick: Pick,
-    dual: DualTape<T>,
-    /// The policy's actions `a_pi`, `A x B`.
-    pub action: DMatrix<T>,
-    /// `Q_cL - threshold` at `a_pi`, scaled `[B]`; the paper's threshold is kappa.
-    pub violation: Vec<T>,
-    action_gradient: DMatrix<T>,
-}
-
-/// What the update minimises: sums over a share of the batch, or means over all of it.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct ActorLoss {
-    /// `w |eps_hat - eps|^2` (Eq. 13).
-    pub cloning: f64,
-    /// `Q_r(s, kappa, a_pi)`.
-    pub reward: f64,
-    /// `|Q_r(s, kappa, a_pi)|`.
-    pub reward_size: f64,
-    /// `Q_cL(s, kappa, a_pi)`.
-    pub long_cost: f64,
-    /// `lambda(kappa) (Q_cL - kappa)`, the negative of Eq. 16.
-    pub penalty: f64,
-    /// `lambda(kappa)`.
-    pub lambda: f64,
-}
-
-impl std::ops::Add for ActorLoss {
-    type Output = Self;
-    fn add(self, other: Self) -> Self {
-        Self {
-            cloning: self.cloning + other.cloning,
-            reward: self.reward + other.reward,
-            reward_size: self.reward_size + other.reward_size,
-            long_cost: self.long_cost + other.long_cost,
-            penalty: self.penalty + other.penalty,
-            lambda: self.lambda + other.lambda,
-        }
-    }
-}
-
-impl std::ops::Mul<f64> for ActorLoss {
-    type Output = Self;
-    fn mul(self, factor: f64) -> Self {
-        Self {
-            cloning: self.cloning * factor,
-            reward: self.reward * factor,
-            reward_size: self.reward_size * factor,
-            long_cost: self.long_cost * factor,
-            penalty: self.penalty * factor,
-            lambda: self.lambda * factor,
-        }
-    }
-}
-
 /// The noise of one update: levels `[B]`, cloning noise `A x B`, and the chain's draws.
 pub struct ActorNoise<'a, T: Scalar> {
     /// Noise level of each sample, `1..=N`.
@@ -148,29 +75,7 @@ pub struct Judges<'a, T: Scalar> {
     pub dual: (&'a Dual, &'a [T]),
 }
 
-impl<T: Scalar> ActorTape<T> {
-    /// `Q_r` or `Q_cL` at the policy's actions.
-    pub(crate) fn values(&self, task: Task) -> impl Iterator<Item = T> {
-        self.critic.values(task, self.pick)
-    }
-}
-
 impl Actor {
-    /// Room for the policy's chain on `samples` columns.
-    fn chain<T: Scalar>(&self, samples: usize) -> Chain<T> {
-        let steps: Vec<_> = match self.policy_gradient {
-            PolicyGradient::Full | PolicyGradient::LastK => {
-                self.process.chain(Sampler::Ddpm, self.process.schedule.steps)
-            }
-            PolicyGradient::OneStep => Vec::new(),
-        };
-        let gradient_steps = match self.policy_gradient {
-            PolicyGradient::LastK => self.gradient_steps,
-            PolicyGradient::Full | PolicyGradient::OneStep => steps.len(),
-        };
-        Chain::new(&self.denoiser, steps, samples, gradient_steps)
-    }
-
     /// Room for updates on `samples` columns, with the room of their chains from `chains`.
     pub fn tape<T: Scalar>(
         &self,
@@ -321,54 +226,6 @@ impl Actor {
             call.noise_gradient().set_column(sample, &(error * (T::of(2.0) * norm * weight * share)));
         }
         loss
-    }
-
-    /// `a_pi`, by the full chain or by the one-step estimate.
-    fn sample<T: Scalar>(&self, weights: Weights<'_, T>, noise: &ActorNoise<'_, T>, tape: &mut ActorTape<T>) {
-        match self.policy_gradient {
-            PolicyGradient::Full | PolicyGradient::LastK => {
-                let lent = || tape.chains.lend(tape.action.ncols(), || self.chain(tape.action.ncols()));
-                let chain = tape.chain.get_or_insert_with(lent);
-                chain.run(&self.denoiser, weights, &tape.context, noise.chain);
-                tape.action.copy_from(&chain.action);
-            }
-            PolicyGradient::OneStep => {
-                for (sample, &level) in noise.levels.iter().enumerate() {
-                    let [from_action, from_noise, ..] = self.estimate::<T>(level);
-                    for row in 0..tape.action.nrows() {
-                        let at = (row, sample);
-                        let estimate = from_action * tape.call.action[at] - from_noise * tape.call.noise()[at];
-                        (tape.action[at], tape.inside[at]) = clip(estimate);
-                    }
-                }
-            }
-        }
-    }
-
-    /// Carries the critics' gradient at `a_pi` back to the network.
-    fn improve<T: Scalar>(&self, weights: Weights<'_, T>, tape: &mut ActorTape<T>, gradient: &mut [T]) {
-        let ActorTape { context, call, chain, chains, inside, action_gradient, .. } = tape;
-        match self.policy_gradient {
-            PolicyGradient::Full | PolicyGradient::LastK => {
-                if let Some(mut chain) = chain.take() {
-                    chain.backward(&self.denoiser, weights, context, action_gradient, gradient);
-                    chains.give_back(chain.action.ncols(), chain);
-                }
-            }
-            PolicyGradient::OneStep => {
-                for sample in 0..inside.ncols() {
-                    let [_, from_noise, ..] = self.estimate::<T>(call.levels[sample]);
-                    let through = action_gradient.column(sample).component_mul(&inside.column(sample));
-                    let mut noise_gradient = call.noise_gradient().column_mut(sample);
-                    noise_gradient -= through * from_noise;
-                }
-            }
-        }
-    }
-
-    /// The coefficients of the estimate of `x0` at a noise level.
-    fn estimate<T: Scalar>(&self, level: usize) -> [T; 5] {
-        coefficients(&self.process.estimate(level))
     }
 }
 

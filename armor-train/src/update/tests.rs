@@ -1,6 +1,9 @@
 //! What the options change in an update, against the update without them.
 
+use std::sync::Arc;
+
 use armor_core::noise::Noise;
+use nalgebra::DMatrix;
 
 use super::*;
 use crate::config::{Config, Preset};

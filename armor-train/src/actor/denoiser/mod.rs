@@ -9,52 +9,15 @@
 //! The bracket is the [`Context`]: it does not change along a chain, so it is
 //! computed once; `W_n e_n` has only `N` different values, the time table.
 
-use std::ops::Range;
+mod call;
+mod layout;
 
 use nalgebra::DMatrix;
 
-use crate::nn::{
-    Activation, Frequencies, Linear, Mlp, Operand, Panels, Passes, Scalar, Tape, Update, Weights, keep_columns,
-    product, sinusoidal_code,
-};
+use crate::nn::{Activation, Operand, Panels, Passes, Scalar, Tape, Update, Weights, product, sinusoidal_code};
 
-/// Widths of the network.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Widths {
-    /// Entries of the state.
-    pub state: usize,
-    /// Entries of the action.
-    pub action: usize,
-    /// Units of the three hidden layers.
-    pub hidden: usize,
-    /// Hidden units of the kappa embedding.
-    pub kappa_hidden: usize,
-    /// Entries of the kappa embedding.
-    pub kappa_embedding: usize,
-    /// Entries of the sinusoidal code of a step.
-    pub time_code: usize,
-    /// Hidden units of the time embedding.
-    pub time_hidden: usize,
-    /// Entries of the time embedding.
-    pub time_embedding: usize,
-    /// Noise levels `N`.
-    pub steps: usize,
-}
-
-/// Layout of the network within its parameters: kappa MLP, time MLP, first layer, body, and
-/// the frequencies of the step's code where they are learnt.
-#[derive(Clone, Debug)]
-pub struct Denoiser {
-    widths: Widths,
-    kappa_scale: f64,
-    /// Whether the noisy action enters the network.
-    sees_action: bool,
-    kappa: Mlp,
-    time: Mlp,
-    first: Linear,
-    body: Mlp,
-    frequencies: Option<Frequencies>,
-}
+pub use call::Call;
+pub use layout::{Denoiser, Widths};
 
 /// What stays the same along a chain, and the gradients that flow back into it.
 #[derive(Clone, Debug)]
@@ -72,148 +35,7 @@ pub struct Context<T: Scalar> {
     table_gradient: DMatrix<T>,
 }
 
-/// One call of the network.
-#[derive(Clone, Debug)]
-pub struct Call<T: Scalar> {
-    /// Noisy actions, `A x B`: the input.
-    pub action: DMatrix<T>,
-    /// Noise level of each sample, `1..=N`: the input.
-    pub levels: Vec<usize>,
-    /// Gradient with respect to the noisy actions, `A x B`, after a backward pass.
-    pub action_gradient: DMatrix<T>,
-    /// The samples that the leading columns belong to, ascending: all, or those kept for the backward pass.
-    kept: Vec<usize>,
-    hidden: DMatrix<T>,
-    hidden_slope: DMatrix<T>,
-    hidden_gradient: DMatrix<T>,
-    body: Tape<T>,
-}
-
-impl<T: Scalar> Call<T> {
-    /// The predicted noise, `A x B`.
-    pub fn noise(&self) -> &DMatrix<T> {
-        self.body.output()
-    }
-
-    /// Frees the room of the gradients; [`Call::swap_gradients`] gives it another.
-    pub fn free_gradients(&mut self) {
-        self.hidden_gradient = DMatrix::zeros(0, 0);
-        self.body.free_gradients();
-    }
-
-    /// Exchanges the room of the gradients, which need not outlive a backward pass.
-    pub fn swap_gradients(&mut self, other: &mut Self) {
-        std::mem::swap(&mut self.hidden_gradient, &mut other.hidden_gradient);
-        self.body.swap_gradients(&mut other.body);
-    }
-
-    /// Where the gradient with respect to the predicted noise is written.
-    pub fn noise_gradient(&mut self) -> &mut DMatrix<T> {
-        self.body.output_gradient()
-    }
-
-    /// Keeps these samples (ascending) for the backward pass, whose gradients then
-    /// stand in the leading columns; the noise gradient of the others is zero.
-    pub fn keep(&mut self, samples: &[usize]) {
-        keep_columns(&mut self.action, samples);
-        keep_columns(&mut self.hidden, samples);
-        keep_columns(&mut self.hidden_slope, samples);
-        self.body.keep(samples);
-        self.kept.clear();
-        self.kept.extend_from_slice(samples);
-    }
-
-    /// The samples of the backward pass, column by column.
-    pub fn kept(&self) -> &[usize] {
-        &self.kept
-    }
-}
-
 impl Denoiser {
-    /// The layout for given widths; the network sees `kappa_scale * kappa`.
-    pub fn new(widths: Widths, kappa_scale: f64) -> Self {
-        let Widths {
-            state, action, hidden, kappa_hidden, kappa_embedding, time_code, time_hidden, time_embedding, ..
-        } = widths;
-        let kappa = Mlp::new(&[1, kappa_hidden, kappa_hidden, kappa_embedding], 0, Activation::Mish, None);
-        let time = Mlp::new(&[time_code, time_hidden, time_embedding], kappa.end(), Activation::Mish, None);
-        let inputs = action + state + kappa_embedding + time_embedding;
-        let first = Linear { inputs, outputs: hidden, offset: time.end() };
-        let body = Mlp::new(&[hidden, hidden, hidden, action], first.end(), Activation::Mish, None);
-        Self { widths, kappa_scale, sees_action: true, kappa, time, first, body, frequencies: None }
-    }
-
-    /// The same layout with frequencies of the step's code that are learnt (O-9).
-    pub fn with_learned_frequencies(self) -> Self {
-        let frequencies = Frequencies { count: self.widths.time_code / 2, offset: self.body.end() };
-        Self { frequencies: Some(frequencies), ..self }
-    }
-
-    /// The same layout for a network that does not see the noisy action, `W_a = 0` for good.
-    pub fn blind(self) -> Self {
-        Self { sees_action: false, ..self }
-    }
-
-    /// Widths of the network.
-    pub const fn widths(&self) -> &Widths {
-        &self.widths
-    }
-
-    /// The factor on kappa.
-    pub const fn kappa_scale(&self) -> f64 {
-        self.kappa_scale
-    }
-
-    /// The kappa embedding.
-    pub const fn kappa(&self) -> &Mlp {
-        &self.kappa
-    }
-
-    /// The time embedding.
-    pub const fn time(&self) -> &Mlp {
-        &self.time
-    }
-
-    /// The layer that noisy action, state and both embeddings enter.
-    pub const fn first(&self) -> &Linear {
-        &self.first
-    }
-
-    /// What follows the first layer.
-    pub const fn body(&self) -> &Mlp {
-        &self.body
-    }
-
-    /// Numbers of the network.
-    pub fn size(&self) -> usize {
-        self.frequencies.as_ref().map_or(self.body.end(), Frequencies::end)
-    }
-
-    /// Inputs of the first layer that are the noisy action, the state, the kappa and the time embedding.
-    pub fn blocks(&self) -> [Range<usize>; 4] {
-        let w = &self.widths;
-        let mut end = 0;
-        [w.action, w.state, w.kappa_embedding, w.time_embedding].map(|width| {
-            end += width;
-            end - width..end
-        })
-    }
-
-    /// PyTorch's default initialisation from draws in `[0, 1)`.
-    pub fn initialise<T: Scalar>(&self, parameters: &mut [T], draws: &mut impl Iterator<Item = f64>) {
-        self.kappa.initialise(parameters, draws);
-        self.time.initialise(parameters, draws);
-        self.first.initialise(parameters, draws);
-        if !self.sees_action {
-            let [of_action, ..] = self.blocks();
-            parameters[self.first.offset..][..of_action.len() * self.first.outputs].fill(T::zero());
-        }
-        self.body.initialise(parameters, draws);
-        if let Some(frequencies) = &self.frequencies {
-            frequencies.initialise(parameters, draws);
-        }
-    }
-
     /// The parameters, with copies of the weights that every call of a chain reads.
     pub fn pack<'a, T: Scalar>(&self, parameters: &'a [T], passes: Passes) -> Panels<'a, T> {
         Panels::new(self.body.layers().iter(), parameters, passes)

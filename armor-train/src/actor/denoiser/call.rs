@@ -1,0 +1,62 @@
+//! One call of the noise predictor, and what it leaves behind for its gradient.
+
+use nalgebra::DMatrix;
+
+use crate::nn::{Scalar, Tape, keep_columns};
+
+/// One call of the network.
+#[derive(Clone, Debug)]
+pub struct Call<T: Scalar> {
+    /// Noisy actions, `A x B`: the input.
+    pub action: DMatrix<T>,
+    /// Noise level of each sample, `1..=N`: the input.
+    pub levels: Vec<usize>,
+    /// Gradient with respect to the noisy actions, `A x B`, after a backward pass.
+    pub action_gradient: DMatrix<T>,
+    /// The samples that the leading columns belong to, ascending: all, or those kept for the backward pass.
+    pub(super) kept: Vec<usize>,
+    pub(super) hidden: DMatrix<T>,
+    pub(super) hidden_slope: DMatrix<T>,
+    pub(super) hidden_gradient: DMatrix<T>,
+    pub(super) body: Tape<T>,
+}
+
+impl<T: Scalar> Call<T> {
+    /// The predicted noise, `A x B`.
+    pub fn noise(&self) -> &DMatrix<T> {
+        self.body.output()
+    }
+
+    /// Frees the room of the gradients; [`Call::swap_gradients`] gives it another.
+    pub fn free_gradients(&mut self) {
+        self.hidden_gradient = DMatrix::zeros(0, 0);
+        self.body.free_gradients();
+    }
+
+    /// Exchanges the room of the gradients, which need not outlive a backward pass.
+    pub fn swap_gradients(&mut self, other: &mut Self) {
+        std::mem::swap(&mut self.hidden_gradient, &mut other.hidden_gradient);
+        self.body.swap_gradients(&mut other.body);
+    }
+
+    /// Where the gradient with respect to the predicted noise is written.
+    pub fn noise_gradient(&mut self) -> &mut DMatrix<T> {
+        self.body.output_gradient()
+    }
+
+    /// Keeps these samples (ascending) for the backward pass, whose gradients then
+    /// stand in the leading columns; the noise gradient of the others is zero.
+    pub fn keep(&mut self, samples: &[usize]) {
+        keep_columns(&mut self.action, samples);
+        keep_columns(&mut self.hidden, samples);
+        keep_columns(&mut self.hidden_slope, samples);
+        self.body.keep(samples);
+        self.kept.clear();
+        self.kept.extend_from_slice(samples);
+    }
+
+    /// The samples of the backward pass, column by column.
+    pub fn kept(&self) -> &[usize] {
+        &self.kept
+    }
+}
