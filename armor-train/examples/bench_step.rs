@@ -21,7 +21,7 @@ use nalgebra::DMatrix;
 
 /// That of the program `armor-train`.
 #[global_allocator]
-static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+static ALLOCATOR: armor_train::allocator::CacheLines = armor_train::allocator::CacheLines;
 
 /// The sizes of `bench/train_step.py`.
 const STATE: usize = 60;

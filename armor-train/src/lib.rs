@@ -16,6 +16,7 @@
 //! | policies from and for other runtimes | [`import`], [`onnx`] |
 
 pub mod actor;
+pub mod allocator;
 pub mod batch;
 pub mod calibrate;
 pub mod cli;

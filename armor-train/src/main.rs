@@ -2,9 +2,9 @@
 
 use std::process::ExitCode;
 
-/// Puts what a chain remembers on huge pages, where the kernel gives them on request.
+/// Matrices begin at a cache line.
 #[global_allocator]
-static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+static ALLOCATOR: armor_train::allocator::CacheLines = armor_train::allocator::CacheLines;
 
 fn main() -> ExitCode {
     armor_train::cli::main()
