@@ -7,10 +7,11 @@ works; the table gives medians over the rounds.
 
 Our backward pass along the chain leaves out samples whose estimate x0 is
 clipped in every entry, so its time depends on the networks, and fresh ones
-flatter it. Ours therefore trains some steps before it is timed (on random
+flatter it: a step takes a fifth longer once 130 are done, and no longer after. Ours
+therefore trains some steps before it is timed (on random
 numbers: real data clip more or less). PyTorch's time does not depend on them.
 
-usage: train_step.py OUR_PROGRAM [--rounds 7] [--steps 3] [--warmup 100] [--threads 1 2]
+usage: train_step.py OUR_PROGRAM [--rounds 7] [--steps 3] [--warmup 200] [--threads 1 2]
 """
 
 import argparse
@@ -106,7 +107,7 @@ def main():
     parser.add_argument("program")
     parser.add_argument("--rounds", type=int, default=7)
     parser.add_argument("--steps", type=int, default=3)
-    parser.add_argument("--warmup", type=int, default=100)
+    parser.add_argument("--warmup", type=int, default=200)
     parser.add_argument("--threads", type=int, nargs="+", default=[1, 2])
     arguments = parser.parse_args()
     print(f"One step: batch {sizes.BATCH}, state {sizes.STATE}, action {sizes.ACTION}, hidden {sizes.HIDDEN}, "

@@ -2,7 +2,7 @@
 # Times one full paper-size training step of ours and of PyTorch's, interleaved,
 # and prints the table of ratios (train_step.py says how it measures).
 #
-#   bench/train_step.sh [--rounds 7] [--steps 3] [--warmup 100] [--threads 1 2]
+#   bench/train_step.sh [--rounds 7] [--steps 3] [--warmup 200] [--threads 1 2]
 #
 # ARMOR_TORCH_PYTHON names a Python that has torch; without it, one is made in
 # target/bench-venv. Meant for a machine that does nothing else meanwhile.
