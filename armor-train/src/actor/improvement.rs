@@ -1,8 +1,7 @@
 //! The policy's own action, and how the critics' gradient flows back from it (Eq. 15).
 
-use serde::{Deserialize, Serialize};
-
 use armor_core::schedule::Sampler;
+use serde::{Deserialize, Serialize};
 
 use super::chain::{Chain, clip, coefficients};
 use super::{Actor, ActorNoise, ActorTape};

@@ -112,3 +112,34 @@ impl<'a, T: Scalar> Weights<'a, T> {
         Some(&self.layers[place])
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::DMatrix;
+
+    use super::*;
+    use crate::nn::{Activation, Mlp};
+    use crate::testing::fill;
+
+    /// Whole and partial panels, and copies of the forward pass alone.
+    #[test]
+    fn a_pass_with_copies_has_the_bits_of_one_without() {
+        let mlp = Mlp::new(&[7, 33, 16, 2], 0, Activation::Mish, None);
+        let draws = |len, stream| fill(len, stream).into_iter().map(|draw| draw as f32).collect::<Vec<_>>();
+        let (parameters, input) = (draws(mlp.end(), 1), DMatrix::from_vec(7, 13, draws(7 * 13, 2)));
+        let pass = |weights: Weights<'_, f32>| {
+            let mut tape = mlp.tape(13);
+            mlp.forward(weights, &input, &mut tape, true);
+            let output = tape.output().clone();
+            tape.output_gradient().copy_from(&output);
+            let (mut gradient, mut below) = (vec![0.0; mlp.end()], DMatrix::zeros(7, 13));
+            mlp.backward(weights, &input, &mut tape, Some(&mut gradient), Some((&mut below, Update::Replace)));
+            [output.as_slice(), &gradient, below.as_slice()].concat().into_iter().map(f32::to_bits).collect::<Vec<_>>()
+        };
+        let plain = pass((&parameters).into());
+        for passes in [Passes::Forward, Passes::Both] {
+            let panels = Panels::new(mlp.layers().iter(), &parameters, passes);
+            assert_eq!(pass((&panels).into()), plain, "{passes:?}");
+        }
+    }
+}

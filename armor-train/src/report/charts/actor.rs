@@ -3,9 +3,9 @@
 use firmware_sim::page::axis::{Scale, label};
 use firmware_sim::page::chart::{Chart, Layer};
 
-use super::super::folder::RunFolder;
 use super::{chart, lines};
 use crate::data::Sorted;
+use crate::report::folder::RunFolder;
 
 pub(super) fn cloning(run: &RunFolder) -> Chart<'_> {
     let entries = run.provenance.action_entries as f64;

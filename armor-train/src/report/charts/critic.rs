@@ -3,9 +3,9 @@
 use firmware_sim::page::axis::Scale;
 use firmware_sim::page::chart::{Chart, Layer};
 
-use super::super::folder::RunFolder;
 use super::{chart, lines};
 use crate::data::ToGo;
+use crate::report::folder::RunFolder;
 
 pub(super) fn losses(run: &RunFolder) -> Chart<'_> {
     let columns = [

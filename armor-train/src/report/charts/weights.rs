@@ -3,8 +3,8 @@
 use firmware_sim::page::axis::Scale;
 use firmware_sim::page::chart::{Chart, Layer};
 
-use super::super::folder::RunFolder;
 use super::{chart, lines};
+use crate::report::folder::RunFolder;
 
 pub(super) fn all(run: &RunFolder) -> Chart<'_> {
     let get = |column| run.metrics.get(column);
