@@ -99,7 +99,7 @@ impl Critic {
         CriticTape {
             options: self.options,
             input: DMatrix::zeros(inputs, samples),
-            trunks: self.trunks.iter().map(|trunk| trunk.tape(samples)).collect(),
+            trunks: self.trunks.iter().map(|trunk| trunk.tape(samples).repeatable()).collect(),
             heads: self.heads.iter().map(|twins| twins.each_ref().map(|head| head.tape(samples))).collect(),
             input_gradient: DMatrix::zeros(inputs, samples),
         }

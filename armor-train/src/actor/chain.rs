@@ -18,7 +18,7 @@ pub struct Chain<T: Scalar> {
     steps: Vec<ChainStep<f64>>,
     /// Steps at the end of the chain that are remembered.
     gradient_steps: usize,
-    /// Between passes only the last has room for gradients, which it lends to the others.
+    /// The remembered steps.
     calls: Vec<Call<T>>,
     /// 1 where the estimate `x0` of a step lay within the bounds, 0 where it was clipped.
     inside: Vec<DMatrix<T>>,
@@ -33,8 +33,7 @@ impl<T: Scalar> Chain<T> {
         let gradient_steps = gradient_steps.min(steps.len());
         let room = gradient_steps.max(1);
         let action = DMatrix::zeros(denoiser.widths().action, samples);
-        let mut calls: Vec<Call<T>> = (0..room).map(|_| denoiser.call(samples)).collect();
-        calls[..room - 1].iter_mut().for_each(Call::free_gradients);
+        let calls = (0..room).map(|_| denoiser.call(samples)).collect();
         Self { calls, inside: vec![action.clone(); room], gradient_steps, steps, action }
     }
 
@@ -105,11 +104,7 @@ impl<T: Scalar> Chain<T> {
         let mut after = action_gradient.clone();
         let remembered = &self.steps[self.steps.len() - self.gradient_steps..];
         for (index, (step, inside)) in remembered.iter().zip(&self.inside).enumerate().rev() {
-            let (earlier, later) = self.calls.split_at_mut(index + 1);
-            let call = &mut earlier[index];
-            if let Some(later) = later.first_mut() {
-                call.swap_gradients(later);
-            }
+            let call = &mut self.calls[index];
             let [from_action, from_noise, to_x0, to_action, _] = coefficients::<T>(step);
             // The gradient with respect to the estimate; a clipped entry passes none.
             let estimate = after.component_mul(inside) * to_x0;
@@ -121,9 +116,6 @@ impl<T: Scalar> Chain<T> {
                 let mut sum = after.column_mut(sample);
                 sum += call.action_gradient.column(column);
             }
-        }
-        if let [first, .., last] = &mut self.calls[..] {
-            first.swap_gradients(last);
         }
     }
 }

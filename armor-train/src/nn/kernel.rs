@@ -107,6 +107,7 @@ fn store_rows<T: Scalar>(out: &mut [T], sums: &[T; ROWS], update: Update<'_, T>)
     match update {
         Update::Replace => out.for_each(|(out, &sum)| *out = sum),
         Update::Add => out.for_each(|(out, &sum)| *out += sum),
+        Update::Multiply => out.for_each(|(out, &sum)| *out *= sum),
         Update::Plus(other) => out.zip(other).for_each(|((out, &sum), &other)| *out = other + sum),
         Update::Times(other) => out.zip(other).for_each(|((out, &sum), &other)| *out = other * sum),
     }
@@ -167,6 +168,7 @@ mod tests {
                 out[(row, column)] = match update {
                     Update::Replace => sum,
                     Update::Add => out[(row, column)] + sum,
+                    Update::Multiply => out[(row, column)] * sum,
                     Update::Plus(other) => other[column * a.nrows() + row] + sum,
                     Update::Times(other) => other[column * a.nrows() + row] * sum,
                 };
@@ -188,7 +190,7 @@ mod tests {
                 let (a_t, b_t) = (a.transpose(), b.transpose());
                 let lefts = [Operand::from(&a), Operand::from(&a_t).transposed()];
                 let rights = [Operand::from(&b), Operand::from(&b_t).transposed()];
-                for update in [Update::Replace, Update::Add, Update::Plus(other), Update::Times(other)] {
+                for update in [Update::Replace, Update::Add, Update::Multiply, Update::Plus(other), Update::Times(other)] {
                     let mut expected = before.clone();
                     by_the_letter(&mut expected, &a, &b, update);
                     for (left, right) in lefts.into_iter().flat_map(|left| rights.map(|right| (left, right))) {

@@ -38,8 +38,13 @@ impl Mlp {
 
     /// Room for passes over `samples` columns.
     pub fn tape<T: Scalar>(&self, samples: usize) -> Tape<T> {
-        let room = || self.layers.iter().map(|layer| DMatrix::zeros(layer.outputs, samples)).collect();
-        Tape { values: room(), slopes: room(), deltas: room(), columns: samples }
+        let room = || self.layers.iter().map(|layer| DMatrix::zeros(layer.outputs, samples)).collect::<Vec<_>>();
+        let (values, mut slopes) = (room(), room());
+        let output_gradient = values.last().cloned().unwrap_or_default();
+        if let (None, Some(last)) = (self.output, slopes.last_mut()) {
+            *last = DMatrix::zeros(0, 0);
+        }
+        Tape { values, slopes, output_gradient, deltas: Vec::new(), columns: samples }
     }
 
     /// What follows a layer.
@@ -70,7 +75,8 @@ impl Mlp {
         }
     }
 
-    /// Back-propagates [`Tape::output_gradient`] through the last forward pass.
+    /// Back-propagates [`Tape::output_gradient`] through the last forward pass, once unless
+    /// the tape is [repeatable](Tape::repeatable).
     ///
     /// Adds to `gradient` (as long as the parameters) where it is given. Where `input_gradient`
     /// is given, the gradient with respect to the input updates it.
@@ -84,23 +90,26 @@ impl Mlp {
         mut input_gradient: Option<(&mut DMatrix<T>, Update<'_, T>)>,
     ) {
         let weights = weights.into();
-        let columns = tape.columns;
-        if let (Some(_), Some(delta), Some(slopes)) = (self.output, tape.deltas.last_mut(), tape.slopes.last()) {
-            scale(delta, slopes, columns);
+        let Tape { values, slopes, output_gradient, deltas, columns } = tape;
+        if let (Some(_), Some(slopes)) = (self.output, slopes.last()) {
+            scale(output_gradient, slopes, *columns);
         }
+        let (deltas, slopes) = if deltas.is_empty() { (slopes, None) } else { (deltas, Some(slopes)) };
         for (index, layer) in self.layers.iter().enumerate().rev() {
-            let (before, rest) = tape.deltas.split_at_mut(index);
-            let delta = Operand::leading(&rest[0], columns);
+            let (before, rest) = deltas.split_at_mut(index);
+            let delta = if index + 1 == self.layers.len() { &*output_gradient } else { &rest[0] };
+            let delta = Operand::leading(delta, *columns);
             if let Some(gradient) = gradient.as_deref_mut() {
-                let input = if index == 0 { input } else { &tape.values[index - 1] };
-                layer.add_gradient(gradient, delta, Operand::leading(input, columns));
+                let input = if index == 0 { input } else { &values[index - 1] };
+                layer.add_gradient(gradient, delta, Operand::leading(input, *columns));
             }
+            let times_slope = || slopes.as_ref().map_or(Update::Multiply, |s| Update::Times(s[index - 1].as_slice()));
             let below = match before.last_mut() {
-                Some(below) => Some((below, Update::Times(tape.slopes[index - 1].as_slice()))),
+                Some(below) => Some((below, times_slope())),
                 None => input_gradient.take(),
             };
             if let Some((out, update)) = below {
-                let len = layer.inputs * columns;
+                let len = layer.inputs * *columns;
                 weights.multiply_transposed(layer, &mut out.as_mut_slice()[..len], delta, update.within(..len));
             }
         }

@@ -86,6 +86,8 @@ pub enum Update<'a, T> {
     Replace,
     /// It is added to them.
     Add,
+    /// They are multiplied by it, entry by entry.
+    Multiply,
     /// They are replaced by its sum with another matrix, as large and stored alike.
     Plus(&'a [T]),
     /// They are replaced by it, multiplied entry by entry with another matrix.
@@ -99,6 +101,7 @@ impl<T> Update<'_, T> {
         match self {
             Self::Replace => Self::Replace,
             Self::Add => Self::Add,
+            Self::Multiply => Self::Multiply,
             Self::Plus(other) => Self::Plus(&other[range]),
             Self::Times(other) => Self::Times(&other[range]),
         }

@@ -4,20 +4,28 @@ use nalgebra::DMatrix;
 
 use super::Scalar;
 
-/// Values and slopes of a stack of layers, and room for gradients; reused from step to step.
+/// Values and slopes of a stack of layers, and their gradients; reused from step to step.
 #[derive(Clone, Debug)]
 pub struct Tape<T: Scalar> {
     /// Output of each layer.
     pub(super) values: Vec<DMatrix<T>>,
     /// Derivative of each layer's activation.
     pub(super) slopes: Vec<DMatrix<T>>,
-    /// Gradient with respect to each layer's sum.
+    /// Gradient with respect to the output.
+    pub(super) output_gradient: DMatrix<T>,
+    /// Gradient with respect to the sum of each layer before the last; none where it is written over the slopes.
     pub(super) deltas: Vec<DMatrix<T>>,
     /// Columns of the above that hold samples.
     pub(super) columns: usize,
 }
 
 impl<T: Scalar> Tape<T> {
+    /// The same room, and more: any number of backward passes may follow a forward pass, not only one.
+    pub fn repeatable(mut self) -> Self {
+        self.deltas = self.slopes[..self.slopes.len() - 1].to_vec();
+        self
+    }
+
     /// The output of the last forward pass, `outputs x samples`.
     pub fn output(&self) -> &DMatrix<T> {
         self.values.last().expect("an Mlp has a layer")
@@ -25,23 +33,12 @@ impl<T: Scalar> Tape<T> {
 
     /// Where the gradient with respect to the output is written before a backward pass.
     pub fn output_gradient(&mut self) -> &mut DMatrix<T> {
-        self.deltas.last_mut().expect("an Mlp has a layer")
+        &mut self.output_gradient
     }
 
     /// [`Tape::output`] and [`Tape::output_gradient`].
     pub fn output_with_gradient(&mut self) -> (&DMatrix<T>, &mut DMatrix<T>) {
-        let gradient = self.deltas.last_mut().expect("an Mlp has a layer");
-        (self.values.last().expect("an Mlp has a layer"), gradient)
-    }
-
-    /// Frees the room of the gradients; [`Tape::swap_gradients`] gives it another.
-    pub fn free_gradients(&mut self) {
-        self.deltas.clear();
-    }
-
-    /// Exchanges the room of the gradients, which need not outlive a backward pass.
-    pub fn swap_gradients(&mut self, other: &mut Self) {
-        std::mem::swap(&mut self.deltas, &mut other.deltas);
+        (self.values.last().expect("an Mlp has a layer"), &mut self.output_gradient)
     }
 
     /// Keeps these samples (ascending) for the backward pass, in the leading columns, and forgets the others.

@@ -16,8 +16,8 @@ pub struct Call<T: Scalar> {
     /// The samples that the leading columns belong to, ascending: all, or those kept for the backward pass.
     pub(super) kept: Vec<usize>,
     pub(super) hidden: DMatrix<T>,
+    /// Derivative of the first layer's activation; after a backward pass, the gradient with respect to its sum.
     pub(super) hidden_slope: DMatrix<T>,
-    pub(super) hidden_gradient: DMatrix<T>,
     pub(super) body: Tape<T>,
 }
 
@@ -25,18 +25,6 @@ impl<T: Scalar> Call<T> {
     /// The predicted noise, `A x B`.
     pub fn noise(&self) -> &DMatrix<T> {
         self.body.output()
-    }
-
-    /// Frees the room of the gradients; [`Call::swap_gradients`] gives it another.
-    pub fn free_gradients(&mut self) {
-        self.hidden_gradient = DMatrix::zeros(0, 0);
-        self.body.free_gradients();
-    }
-
-    /// Exchanges the room of the gradients, which need not outlive a backward pass.
-    pub fn swap_gradients(&mut self, other: &mut Self) {
-        std::mem::swap(&mut self.hidden_gradient, &mut other.hidden_gradient);
-        self.body.swap_gradients(&mut other.body);
     }
 
     /// Where the gradient with respect to the predicted noise is written.

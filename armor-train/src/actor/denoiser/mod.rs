@@ -68,7 +68,6 @@ impl Denoiser {
             action_gradient: action(),
             hidden: hidden(),
             hidden_slope: hidden(),
-            hidden_gradient: hidden(),
             body: self.body.tape(samples),
         }
     }
@@ -139,9 +138,9 @@ impl Denoiser {
         gradient: &mut [T],
     ) {
         let weights = weights.into();
-        let Call { hidden, hidden_slope, hidden_gradient, body, .. } = call;
-        let below = (&mut *hidden_gradient, Update::Times(hidden_slope.as_slice()));
-        self.body.backward(weights, hidden, body, Some(gradient), Some(below));
+        let Call { hidden, hidden_slope, body, .. } = call;
+        self.body.backward(weights, hidden, body, Some(gradient), Some((hidden_slope, Update::Multiply)));
+        let hidden_gradient = &call.hidden_slope;
         let columns = call.kept.len();
 
         // A network that does not see the action leaves its gradient at zero.

@@ -93,6 +93,7 @@ unsafe fn multiply(out: &mut [f32], left: Left<'_>, b: Operand<'_, f32>, update:
         match update {
             Update::Replace => strips::<REPLACE>(Target { out, other: out }, left, b),
             Update::Add => strips::<PLUS>(Target { out, other: out }, left, b),
+            Update::Multiply => strips::<TIMES>(Target { out, other: out }, left, b),
             Update::Plus(other) => strips::<PLUS>(Target { out, other: other.as_ptr() }, left, b),
             Update::Times(other) => strips::<TIMES>(Target { out, other: other.as_ptr() }, left, b),
         }

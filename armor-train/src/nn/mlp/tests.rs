@@ -38,7 +38,7 @@ fn a_second_backward_pass_adds_to_the_gradient() {
     let mlp = Mlp::new(&[2, 3, 1], 0, Activation::Mish, None);
     let parameters: Vec<f64> = fill(mlp.end(), 1);
     let input = DMatrix::from_vec(2, 4, fill(8, 2));
-    let mut tape = mlp.tape(4);
+    let mut tape = mlp.tape(4).repeatable();
     let mut gradient = vec![0.0; mlp.end()];
     mlp.forward(&parameters, &input, &mut tape, true);
     tape.output_gradient().fill(1.0);
