@@ -5,7 +5,7 @@ use armor_core::schedule::ChainStep;
 use nalgebra::DMatrix;
 
 use super::denoiser::{Call, Context, Denoiser};
-use crate::nn::{Scalar, Weights};
+use crate::nn::{Ahead, Scalar, Weights};
 
 /// Where a chain takes its noise from: `draw(stage, sample, out)` fills `out`
 /// `[A]` with standard normal draws; stage 0 is the start `a^N`, stage `i + 1` the
@@ -60,10 +60,11 @@ impl<T: Scalar> Chain<T> {
         for (index, step) in self.steps.iter().enumerate() {
             let gradient = index >= forgotten;
             let slot = index.saturating_sub(forgotten);
+            let ahead = self.written_soon(slot);
             let call = &mut self.calls[slot];
             call.action.copy_from(&self.action);
             call.levels.fill(step.n);
-            denoiser.forward(weights, context, call, gradient);
+            denoiser.forward(weights.fetching(&ahead), context, call, gradient);
             let [from_action, from_noise, to_x0, to_action, sigma] = coefficients::<T>(step);
             for (sample, mut column) in self.action.column_iter_mut().enumerate() {
                 if step.sigma != 0.0 {
@@ -90,6 +91,20 @@ impl<T: Scalar> Chain<T> {
         }
     }
 
+    /// What the products of a call may fetch: the rest of what it writes, and half of what the next one does.
+    fn written_soon(&self, slot: usize) -> Ahead {
+        let half = 3;
+        let next = self.calls.get(slot + 1).into_iter().flat_map(|call| call.written().take(half));
+        Ahead::new(self.calls[slot].written().skip(half).chain(next))
+    }
+
+    /// What the products of a backward pass may fetch.
+    fn read_soon(&self, slot: usize) -> Ahead {
+        let inner = 2;
+        let next = self.calls[..slot].last().into_iter().flat_map(|call| call.slopes().take(inner));
+        Ahead::new(self.calls[slot].slopes().skip(inner).chain(next))
+    }
+
     /// Back-propagates `action_gradient`, `A x B`, with respect to the end of
     /// the last run, through the remembered steps; adds to `gradient` and to the gradients in `context`.
     pub fn backward<'a>(
@@ -104,19 +119,21 @@ impl<T: Scalar> Chain<T> {
         let mut after = action_gradient.clone();
         let remembered = &self.steps[self.steps.len() - self.gradient_steps..];
         for (index, (step, inside)) in remembered.iter().zip(&self.inside).enumerate().rev() {
+            let ahead = self.read_soon(index);
             let call = &mut self.calls[index];
             let [from_action, from_noise, to_x0, to_action, _] = coefficients::<T>(step);
             // The gradient with respect to the estimate; a clipped entry passes none.
             let estimate = after.component_mul(inside) * to_x0;
             let noise_gradient = estimate.select_columns(call.kept()) * -from_noise;
             call.noise_gradient().columns_mut(0, noise_gradient.ncols()).copy_from(&noise_gradient);
-            denoiser.backward(weights, context, call, gradient);
+            denoiser.backward(weights.fetching(&ahead), context, call, gradient);
             after = after * to_action + estimate * from_action;
             for (column, &sample) in call.kept().iter().enumerate() {
                 let mut sum = after.column_mut(sample);
                 sum += call.action_gradient.column(column);
             }
         }
+        denoiser.add_body_gradient(&self.calls[..remembered.len()], gradient);
     }
 }
 

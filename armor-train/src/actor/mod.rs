@@ -165,6 +165,7 @@ impl Actor {
 
         self.improve(weights, tape, gradient);
         self.denoiser.backward(weights, &mut tape.context, &mut tape.call, gradient);
+        self.denoiser.add_body_gradient(std::slice::from_ref(&tape.call), gradient);
         self.denoiser.finish(weights, &batch.state, &mut tape.context, gradient);
     }
 
@@ -185,6 +186,7 @@ impl Actor {
         self.denoiser.prepare(weights, &batch.state, &batch.condition, &mut tape.context);
         let loss = self.clone_behaviour(weights, batch, share, noise, tape);
         self.denoiser.backward(weights, &mut tape.context, &mut tape.call, gradient);
+        self.denoiser.add_body_gradient(std::slice::from_ref(&tape.call), gradient);
         self.denoiser.finish(weights, &batch.state, &mut tape.context, gradient);
         loss
     }

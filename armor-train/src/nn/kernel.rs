@@ -16,7 +16,7 @@ mod avx512;
 use multiversion::multiversion;
 use multiversion::target::target_cfg_f;
 
-use super::Scalar;
+use super::{Ahead, Scalar};
 use super::product::{Operand, Packed, Update};
 
 /// Rows of a tile: two vectors of eight f32.
@@ -120,21 +120,30 @@ pub(super) fn multiply_f32(
     panels: &[[f32; ROWS]],
     b: Operand<'_, f32>,
     update: Update<'_, f32>,
+    ahead: &Ahead,
 ) {
     #[cfg(target_arch = "x86_64")]
     if let Some(kernel) = avx512::Avx512::detect() {
-        return kernel.multiply(out, rows, panels, b, update);
+        return kernel.multiply(out, rows, panels, b, update, ahead);
     }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = ahead;
     multiply_safely(out, rows, panels, b, update);
 }
 
 /// As [`multiply_f32`], with the left factor as it lies, if that saves a copy.
-pub(super) fn product_f32(out: &mut [f32], a: Operand<'_, f32>, b: Operand<'_, f32>, update: Update<'_, f32>) {
+pub(super) fn product_f32(
+    out: &mut [f32],
+    a: Operand<'_, f32>,
+    b: Operand<'_, f32>,
+    update: Update<'_, f32>,
+    ahead: &Ahead,
+) {
     #[cfg(target_arch = "x86_64")]
     if let Some(kernel) = avx512::Avx512::detect().filter(|_| !a.is_transposed()) {
-        return kernel.product(out, a, b, update);
+        return kernel.product(out, a, b, update, ahead);
     }
-    Packed::new(a).multiply(out, b, update);
+    Packed::new(a).multiply(out, b, update, ahead);
 }
 
 /// [`multiply`] in f32, compiled for AVX2 as well and chosen at run time.
@@ -199,7 +208,7 @@ mod tests {
                             let mut out = before.clone();
                             match way {
                                 "product" => product(out.as_mut_slice(), left, right, update),
-                                "packed" => packed.multiply(out.as_mut_slice(), right, update),
+                                "packed" => packed.multiply(out.as_mut_slice(), right, update, Ahead::nothing()),
                                 _ => multiply_safely(out.as_mut_slice(), m, packed.panels(), right, update),
                             }
                             assert_eq!(bits(&out), bits(&expected), "{way}, {m} x {k} x {n}, {update:?}");

@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
-use super::Scalar;
-use super::product::{Operand, Update, product};
+use super::product::{Operand, Update, product, product_fetching};
+use super::{Ahead, Scalar};
 
 /// Where a layer lies in the parameters of its network.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -53,9 +53,16 @@ impl Linear {
         &mut parameters[self.end() - self.outputs..self.end()]
     }
 
-    /// Adds the gradient of weights and bias: `delta x^T` and the row sums of `delta`.
-    pub fn add_gradient<T: Scalar>(&self, gradient: &mut [T], delta: Operand<'_, T>, input: Operand<'_, T>) {
-        self.add_block_gradient(gradient, 0..self.inputs, delta, input);
+    /// Adds the gradient of weights and bias: `delta x^T` and the row sums of `delta`; meanwhile may fetch what is `ahead`.
+    pub fn add_gradient<T: Scalar>(
+        &self,
+        gradient: &mut [T],
+        delta: Operand<'_, T>,
+        input: Operand<'_, T>,
+        ahead: &Ahead,
+    ) {
+        let weights = &mut gradient[self.range(0..self.inputs)];
+        product_fetching(weights, delta, input.transposed(), Update::Add, ahead);
         self.add_bias_gradient(gradient, delta);
     }
 

@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 
 use super::product::{Operand, Update};
-use super::{Activation, Linear, Scalar, Tape, Weights};
+use super::{Activation, Ahead, Linear, Scalar, Tape, Weights};
 
 /// Layout of a stack of layers within a parameter vector.
 #[derive(Clone, Debug)]
@@ -101,7 +101,7 @@ impl Mlp {
             let delta = Operand::leading(delta, *columns);
             if let Some(gradient) = gradient.as_deref_mut() {
                 let input = if index == 0 { input } else { &values[index - 1] };
-                layer.add_gradient(gradient, delta, Operand::leading(input, *columns));
+                layer.add_gradient(gradient, delta, Operand::leading(input, *columns), Ahead::nothing());
             }
             let times_slope = || slopes.as_ref().map_or(Update::Multiply, |s| Update::Times(s[index - 1].as_slice()));
             let below = match before.last_mut() {
@@ -113,6 +113,19 @@ impl Mlp {
                 weights.multiply_transposed(layer, &mut out.as_mut_slice()[..len], delta, update.within(..len));
             }
         }
+    }
+
+    /// Adds the gradient of a layer, given by its index, after a backward pass.
+    pub fn add_layer_gradient<T: Scalar>(
+        &self,
+        index: usize,
+        input: &DMatrix<T>,
+        tape: &Tape<T>,
+        gradient: &mut [T],
+        ahead: &Ahead,
+    ) {
+        let [input, delta] = tape.around(index, input);
+        self.layers[index].add_gradient(gradient, delta, input, ahead);
     }
 
     /// PyTorch's default: weights and biases uniform within `1 / sqrt(inputs)`, from draws in `[0, 1)`.

@@ -9,6 +9,7 @@
 
 mod activation;
 mod adam;
+mod ahead;
 mod kernel;
 mod linear;
 mod mlp;
@@ -20,6 +21,7 @@ mod weights;
 
 pub use activation::Activation;
 pub use adam::Adam;
+pub use ahead::Ahead;
 pub use linear::Linear;
 pub use mlp::Mlp;
 pub use product::{Operand, Update, product};

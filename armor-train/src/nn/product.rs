@@ -4,7 +4,7 @@ use std::slice::SliceIndex;
 
 use nalgebra::DMatrix;
 
-use super::Scalar;
+use super::{Ahead, Scalar};
 use super::kernel::{self, ROWS};
 
 /// A matrix to be read: stored column by column, or the transpose of one that is.
@@ -54,7 +54,7 @@ impl<'a, T> Operand<'a, T> {
     }
 
     /// All numbers, in the order in which they are stored.
-    pub(super) const fn values(&self) -> &'a [T] {
+    pub(crate) const fn values(&self) -> &'a [T] {
         self.values
     }
 
@@ -133,13 +133,13 @@ impl<T: Scalar> Packed<T> {
         &self.panels
     }
 
-    /// Writes the product of the packed matrix and `b` to `out`, column by column.
+    /// Writes the product of the packed matrix and `b` to `out`, column by column, and may fetch what is `ahead`.
     ///
     /// # Panics
     /// Unless the dimensions fit.
-    pub(super) fn multiply(&self, out: &mut [T], b: Operand<'_, T>, update: Update<'_, T>) {
+    pub(super) fn multiply(&self, out: &mut [T], b: Operand<'_, T>, update: Update<'_, T>, ahead: &Ahead) {
         check(out, [self.rows, self.depth], b, update);
-        T::multiply(out, self.rows, &self.panels, b, update);
+        T::multiply(out, self.rows, &self.panels, b, update, ahead);
     }
 }
 
@@ -148,11 +148,25 @@ impl<T: Scalar> Packed<T> {
 /// # Panics
 /// Unless the dimensions fit.
 pub fn product<T: Scalar>(out: &mut [T], a: Operand<'_, T>, b: Operand<'_, T>, update: Update<'_, T>) {
+    product_fetching(out, a, b, update, Ahead::nothing());
+}
+
+/// [`product`], which meanwhile may fetch what is `ahead`.
+///
+/// # Panics
+/// As [`product`].
+pub(super) fn product_fetching<T: Scalar>(
+    out: &mut [T],
+    a: Operand<'_, T>,
+    b: Operand<'_, T>,
+    update: Update<'_, T>,
+    ahead: &Ahead,
+) {
     check(out, [a.rows(), a.columns()], b, update);
     if a.rows() < ROWS && b.is_transposed() && b.columns() >= ROWS {
         turned_product(out, a, b, update);
     } else {
-        T::product(out, a, b, update);
+        T::product(out, a, b, update, ahead);
     }
 }
 
@@ -161,7 +175,7 @@ pub fn product<T: Scalar>(out: &mut [T], a: Operand<'_, T>, b: Operand<'_, T>, u
 fn turned_product<T: Scalar>(out: &mut [T], a: Operand<'_, T>, b: Operand<'_, T>, update: Update<'_, T>) {
     let (rows, columns) = (a.rows(), b.columns());
     let mut turned = vec![T::zero(); out.len()];
-    T::product(&mut turned, b.transposed(), a.transposed(), Update::Replace);
+    T::product(&mut turned, b.transposed(), a.transposed(), Update::Replace, Ahead::nothing());
     let mut sums = [T::zero(); ROWS];
     for (column, out) in out.chunks_exact_mut(rows).enumerate() {
         for (row, sum) in sums[..rows].iter_mut().enumerate() {
@@ -224,7 +238,7 @@ mod tests {
                 let mut out = DMatrix::from_element(m, n, f64::NAN);
                 product(out.as_mut_slice(), a, b, Update::Replace);
                 assert!((&out - &expected).amax() < 1e-12);
-                Packed::new(a).multiply(out.as_mut_slice(), b, Update::Add);
+                Packed::new(a).multiply(out.as_mut_slice(), b, Update::Add, Ahead::nothing());
                 assert!((&out - 2.0 * &expected).amax() < 1e-12);
             }
         }

@@ -3,6 +3,7 @@
 use nalgebra::RealField;
 use serde::{Serialize, de::DeserializeOwned};
 
+use super::Ahead;
 use super::kernel::{self, ROWS};
 use super::product::{Operand, Packed, Update};
 
@@ -26,19 +27,21 @@ pub trait Scalar: RealField + Copy + Serialize + DeserializeOwned + 'static {
     fn of(value: f64) -> Self;
     /// The value in double precision.
     fn to_f64(self) -> f64;
-    /// Writes the product of a left factor of `rows` rows, in panels, and of `b` to `out`.
+    /// Writes the product of a left factor of `rows` rows, in panels, and of `b` to `out`, and may fetch
+    /// what is `ahead`.
     fn multiply(
         out: &mut [Self],
         rows: usize,
         panels: &[[Self; ROWS]],
         b: Operand<'_, Self>,
         update: Update<'_, Self>,
+        _ahead: &Ahead,
     ) {
         kernel::multiply(out, rows, panels, b, update, |a, b, sum| a * b + sum);
     }
-    /// Writes the product of `a` and `b` to `out`.
-    fn product(out: &mut [Self], a: Operand<'_, Self>, b: Operand<'_, Self>, update: Update<'_, Self>) {
-        Packed::new(a).multiply(out, b, update);
+    /// Writes the product of `a` and `b` to `out`, and may fetch what is `ahead`.
+    fn product(out: &mut [Self], a: Operand<'_, Self>, b: Operand<'_, Self>, update: Update<'_, Self>, ahead: &Ahead) {
+        Packed::new(a).multiply(out, b, update, ahead);
     }
     /// The value of a recorded number.
     fn of_f32(value: f32) -> Self {
@@ -71,11 +74,12 @@ impl Scalar for f32 {
         panels: &[[Self; ROWS]],
         b: Operand<'_, Self>,
         update: Update<'_, Self>,
+        ahead: &Ahead,
     ) {
-        kernel::multiply_f32(out, rows, panels, b, update);
+        kernel::multiply_f32(out, rows, panels, b, update, ahead);
     }
-    fn product(out: &mut [Self], a: Operand<'_, Self>, b: Operand<'_, Self>, update: Update<'_, Self>) {
-        kernel::product_f32(out, a, b, update);
+    fn product(out: &mut [Self], a: Operand<'_, Self>, b: Operand<'_, Self>, update: Update<'_, Self>, ahead: &Ahead) {
+        kernel::product_f32(out, a, b, update, ahead);
     }
 }
 

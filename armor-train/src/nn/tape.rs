@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::Scalar;
+use super::{Operand, Scalar};
 
 /// Values and slopes of a stack of layers, and their gradients; reused from step to step.
 #[derive(Clone, Debug)]
@@ -39,6 +39,20 @@ impl<T: Scalar> Tape<T> {
     /// [`Tape::output`] and [`Tape::output_gradient`].
     pub fn output_with_gradient(&mut self) -> (&DMatrix<T>, &mut DMatrix<T>) {
         (self.values.last().expect("an Mlp has a layer"), &mut self.output_gradient)
+    }
+
+    /// Output and slopes of each layer before the last.
+    pub(crate) fn layers(&self) -> impl DoubleEndedIterator<Item = [&DMatrix<T>; 2]> {
+        let inner = ..self.values.len() - 1;
+        self.values[inner].iter().zip(&self.slopes[inner]).map(|(values, slopes)| [values, slopes])
+    }
+
+    /// The input of a layer, given by its index, and after a backward pass the gradient with respect to its sum.
+    pub(crate) fn around<'a>(&'a self, layer: usize, input: &'a DMatrix<T>) -> [Operand<'a, T>; 2] {
+        let deltas = if self.deltas.is_empty() { &self.slopes } else { &self.deltas };
+        let delta = if layer + 1 == self.values.len() { &self.output_gradient } else { &deltas[layer] };
+        let input = if layer == 0 { input } else { &self.values[layer - 1] };
+        [input, delta].map(|matrix| Operand::leading(matrix, self.columns))
     }
 
     /// Keeps these samples (ascending) for the backward pass, in the leading columns, and forgets the others.

@@ -2,8 +2,8 @@
 
 use rayon::prelude::*;
 
-use super::product::{Operand, Packed, Update, product};
-use super::{Linear, Scalar};
+use super::product::{Operand, Packed, Update, product_fetching};
+use super::{Ahead, Linear, Scalar};
 
 /// The passes that a copy of weights serves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -46,11 +46,12 @@ impl<'a, T: Scalar> Panels<'a, T> {
     }
 }
 
-/// Parameters to be read, and the copies of weights that there are.
+/// Parameters to be read, the copies of weights that there are, and what may be fetched during products with them.
 #[derive(Debug)]
 pub struct Weights<'a, T> {
     parameters: &'a [T],
     layers: &'a [LayerPanels<T>],
+    ahead: &'a Ahead,
 }
 
 impl<T> Clone for Weights<'_, T> {
@@ -63,7 +64,7 @@ impl<T> Copy for Weights<'_, T> {}
 
 impl<'a, T> From<&'a [T]> for Weights<'a, T> {
     fn from(parameters: &'a [T]) -> Self {
-        Self { parameters, layers: &[] }
+        Self { parameters, layers: &[], ahead: Ahead::nothing() }
     }
 }
 
@@ -75,11 +76,19 @@ impl<'a, T> From<&'a Vec<T>> for Weights<'a, T> {
 
 impl<'a, T> From<&'a Panels<'_, T>> for Weights<'a, T> {
     fn from(panels: &'a Panels<'_, T>) -> Self {
-        Self { parameters: panels.parameters, layers: &panels.layers }
+        Self { parameters: panels.parameters, layers: &panels.layers, ahead: Ahead::nothing() }
     }
 }
 
 impl<'a, T: Scalar> Weights<'a, T> {
+    /// The same weights, whose products fetch what is `ahead`.
+    pub const fn fetching<'b>(self, ahead: &'b Ahead) -> Weights<'b, T>
+    where
+        'a: 'b,
+    {
+        Weights { parameters: self.parameters, layers: self.layers, ahead }
+    }
+
     /// All parameters of the network.
     pub const fn parameters(self) -> &'a [T] {
         self.parameters
@@ -88,8 +97,8 @@ impl<'a, T: Scalar> Weights<'a, T> {
     /// Writes `W input` to `out`, column by column.
     pub(super) fn multiply(self, layer: &Linear, out: &mut [T], input: Operand<'_, T>, update: Update<'_, T>) {
         match self.panels(layer) {
-            Some(panels) => panels.weights.multiply(out, input, update),
-            None => product(out, layer.weights(self.parameters), input, update),
+            Some(panels) => panels.weights.multiply(out, input, update, self.ahead),
+            None => product_fetching(out, layer.weights(self.parameters), input, update, self.ahead),
         }
     }
 
@@ -102,8 +111,11 @@ impl<'a, T: Scalar> Weights<'a, T> {
         update: Update<'_, T>,
     ) {
         match self.panels(layer).and_then(|panels| panels.transposed.as_ref()) {
-            Some(transposed) => transposed.multiply(out, delta, update),
-            None => product(out, layer.weights(self.parameters).transposed(), delta, update),
+            Some(transposed) => transposed.multiply(out, delta, update, self.ahead),
+            None => {
+                let transposed = layer.weights(self.parameters).transposed();
+                product_fetching(out, transposed, delta, update, self.ahead);
+            }
         }
     }
 

@@ -32,6 +32,18 @@ impl<T: Scalar> Call<T> {
         self.body.output_gradient()
     }
 
+    /// What a forward pass writes, in this order.
+    pub(crate) fn written(&self) -> impl Iterator<Item = &[T]> {
+        let inner = self.body.layers();
+        [&self.hidden, &self.hidden_slope].into_iter().chain(inner.flatten()).map(DMatrix::as_slice)
+    }
+
+    /// What a backward pass to the inputs reads and writes, in this order.
+    pub(crate) fn slopes(&self) -> impl Iterator<Item = &[T]> {
+        let inner = self.body.layers().rev().map(|[_, slopes]| slopes);
+        inner.chain([&self.hidden_slope]).map(|matrix| &matrix.as_slice()[..matrix.nrows() * self.kept.len()])
+    }
+
     /// Keeps these samples (ascending) for the backward pass, whose gradients then
     /// stand in the leading columns; the noise gradient of the others is zero.
     pub fn keep(&mut self, samples: &[usize]) {

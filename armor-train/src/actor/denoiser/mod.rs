@@ -14,7 +14,7 @@ mod layout;
 
 use nalgebra::DMatrix;
 
-use crate::nn::{Activation, Operand, Panels, Passes, Scalar, Tape, Update, Weights, product, sinusoidal_code};
+use crate::nn::{Activation, Ahead, Operand, Panels, Passes, Scalar, Tape, Update, Weights, product, sinusoidal_code};
 
 pub use call::Call;
 pub use layout::{Denoiser, Widths};
@@ -139,7 +139,7 @@ impl Denoiser {
     ) {
         let weights = weights.into();
         let Call { hidden, hidden_slope, body, .. } = call;
-        self.body.backward(weights, hidden, body, Some(gradient), Some((hidden_slope, Update::Multiply)));
+        self.body.backward(weights, hidden, body, None, Some((hidden_slope, Update::Multiply)));
         let hidden_gradient = &call.hidden_slope;
         let columns = call.kept.len();
 
@@ -157,6 +157,19 @@ impl Denoiser {
             constant_sum += &column;
             let mut table_sum = context.table_gradient.column_mut(call.levels[sample] - 1);
             table_sum += column;
+        }
+    }
+
+    /// Adds the gradient of the body after backward passes of `calls`, the last one first.
+    ///
+    /// Layer by layer, so that the gradient of one stays in the cache while the calls pass by.
+    pub fn add_body_gradient<T: Scalar>(&self, calls: &[Call<T>], gradient: &mut [T]) {
+        for layer in (0..self.body.layers().len()).rev() {
+            for (index, call) in calls.iter().enumerate().rev() {
+                let next = index.checked_sub(1).map(|next| &calls[next]);
+                let ahead = Ahead::new(next.into_iter().flat_map(|next| next.body.around(layer, &next.hidden).map(|m| m.values())));
+                self.body.add_layer_gradient(layer, &call.hidden, &call.body, gradient, &ahead);
+            }
         }
     }
 

@@ -8,6 +8,7 @@
 use core::arch::x86_64::*;
 
 use super::ROWS;
+use crate::nn::Ahead;
 use crate::nn::product::{Operand, Update};
 
 /// Panels of a tile.
@@ -38,23 +39,31 @@ impl Avx512 {
         panels: &[[f32; ROWS]],
         b: Operand<'_, f32>,
         update: Update<'_, f32>,
+        ahead: &Ahead,
     ) {
         let depth = b.rows();
         assert_eq!(panels.len(), rows.div_ceil(ROWS) * depth, "the left factor has a panel for every 16 rows");
         let left = Left { values: panels.as_flattened(), rows, depth, step: ROWS, panel: ROWS * depth };
         // SAFETY: `self` is the proof that the processor has AVX-512, and the panels are as long as was asserted.
-        unsafe { multiply(out, left, b, update) }
+        unsafe { multiply(out, left, b, update, ahead) }
     }
 
     /// As [`Avx512::multiply`], with the left factor where it is.
     ///
     /// # Panics
     /// Unless the dimensions fit, and if `a` is transposed.
-    pub(super) fn product(self, out: &mut [f32], a: Operand<'_, f32>, b: Operand<'_, f32>, update: Update<'_, f32>) {
+    pub(super) fn product(
+        self,
+        out: &mut [f32],
+        a: Operand<'_, f32>,
+        b: Operand<'_, f32>,
+        update: Update<'_, f32>,
+        ahead: &Ahead,
+    ) {
         assert!(!a.is_transposed() && a.columns() == b.rows(), "a stored left factor, as deep as the right one");
         let left = Left { values: a.values(), rows: a.rows(), depth: a.columns(), step: a.rows(), panel: ROWS };
         // SAFETY: as above; an operand has all its values.
-        unsafe { multiply(out, left, b, update) }
+        unsafe { multiply(out, left, b, update, ahead) }
     }
 }
 
@@ -70,18 +79,25 @@ struct Left<'a> {
     panel: usize,
 }
 
-/// Where the sums go, column by column, and what they are joined with on their way.
+/// Where the sums go, column by column, what they are joined with on their way, and what is fetched meanwhile.
 #[derive(Clone, Copy)]
-struct Target {
+struct Target<'a> {
     out: *mut f32,
     /// As large as the result, and perhaps the result itself.
     other: *const f32,
+    ahead: &'a Ahead,
 }
 
 /// # Safety
 /// All numbers that `left` describes lie within its values.
 #[target_feature(enable = "avx512f")]
-unsafe fn multiply(out: &mut [f32], left: Left<'_>, b: Operand<'_, f32>, update: Update<'_, f32>) {
+unsafe fn multiply(
+    out: &mut [f32],
+    left: Left<'_>,
+    b: Operand<'_, f32>,
+    update: Update<'_, f32>,
+    ahead: &Ahead,
+) {
     assert_eq!(out.len(), left.rows * b.columns(), "the result has rows times columns values");
     assert_eq!(left.depth, b.rows(), "inner dimensions agree");
     if let Update::Plus(other) | Update::Times(other) = update {
@@ -91,11 +107,11 @@ unsafe fn multiply(out: &mut [f32], left: Left<'_>, b: Operand<'_, f32>, update:
     // SAFETY: the result and the other matrix have as many values as was asserted.
     unsafe {
         match update {
-            Update::Replace => strips::<REPLACE>(Target { out, other: out }, left, b),
-            Update::Add => strips::<PLUS>(Target { out, other: out }, left, b),
-            Update::Multiply => strips::<TIMES>(Target { out, other: out }, left, b),
-            Update::Plus(other) => strips::<PLUS>(Target { out, other: other.as_ptr() }, left, b),
-            Update::Times(other) => strips::<TIMES>(Target { out, other: other.as_ptr() }, left, b),
+            Update::Replace => strips::<REPLACE>(Target { out, other: out, ahead }, left, b),
+            Update::Add => strips::<PLUS>(Target { out, other: out, ahead }, left, b),
+            Update::Multiply => strips::<TIMES>(Target { out, other: out, ahead }, left, b),
+            Update::Plus(other) => strips::<PLUS>(Target { out, other: other.as_ptr(), ahead }, left, b),
+            Update::Times(other) => strips::<TIMES>(Target { out, other: other.as_ptr(), ahead }, left, b),
         }
     }
 }
@@ -103,7 +119,7 @@ unsafe fn multiply(out: &mut [f32], left: Left<'_>, b: Operand<'_, f32>, update:
 /// # Safety
 /// As [`multiply`]; the target is as high as the left factor and as wide as `b`.
 #[target_feature(enable = "avx512f")]
-unsafe fn strips<const UPDATE: u8>(target: Target, left: Left<'_>, b: Operand<'_, f32>) {
+unsafe fn strips<const UPDATE: u8>(target: Target<'_>, left: Left<'_>, b: Operand<'_, f32>) {
     for first in (0..left.rows).step_by(PANELS * ROWS) {
         // SAFETY: `first` is a row, and where there is more than a panel below it, a second panel.
         unsafe {
@@ -121,7 +137,7 @@ unsafe fn strips<const UPDATE: u8>(target: Target, left: Left<'_>, b: Operand<'_
 /// # Safety
 /// As [`strips`]; `P` panels begin at `first` or below it.
 #[target_feature(enable = "avx512f")]
-unsafe fn strip<const UPDATE: u8, const P: usize>(target: Target, left: Left<'_>, first: usize, b: Operand<'_, f32>) {
+unsafe fn strip<const UPDATE: u8, const P: usize>(target: Target<'_>, left: Left<'_>, first: usize, b: Operand<'_, f32>) {
     // SAFETY: handed on.
     unsafe {
         let at = tiles::<UPDATE, P, 12>(target, left, first, b, 0);
@@ -138,7 +154,7 @@ unsafe fn strip<const UPDATE: u8, const P: usize>(target: Target, left: Left<'_>
 /// As [`strip`].
 #[target_feature(enable = "avx512f")]
 unsafe fn tiles<const UPDATE: u8, const P: usize, const C: usize>(
-    target: Target,
+    target: Target<'_>,
     left: Left<'_>,
     first: usize,
     b: Operand<'_, f32>,
@@ -168,7 +184,11 @@ unsafe fn tiles<const UPDATE: u8, const P: usize, const C: usize>(
                 }
             }
         }
+        // A quarter of a line for each place of the inner dimension; without work, lines that are at hand.
+        let mut ahead = target.ahead.next(left.depth / 4).map_or(a, core::ptr::with_exposed_provenance);
         for _ in 0..left.depth {
+            _mm_prefetch::<_MM_HINT_T1>(ahead.cast());
+            ahead = ahead.wrapping_add(4);
             let mut rows = [_mm512_setzero_ps(); P];
             for panel in 0..P {
                 // SAFETY: the rows of the mask are rows of the left factor.
