@@ -146,6 +146,20 @@ pub(super) fn product_f32(
     Packed::new(a).multiply(out, b, update, ahead);
 }
 
+/// Exchanges rows and columns of a block.
+pub(super) fn transpose<T: Scalar>(block: &mut [[T; ROWS]; ROWS]) {
+    *block = std::array::from_fn(|column| block.map(|row| row[column]));
+}
+
+/// [`transpose`] in f32, by the widest vectors of this processor.
+pub(super) fn transpose_f32(block: &mut [[f32; ROWS]; ROWS]) {
+    #[cfg(target_arch = "x86_64")]
+    if let Some(kernel) = avx512::Avx512::detect() {
+        return kernel.transpose(block);
+    }
+    transpose(block);
+}
+
 /// [`multiply`] in f32, compiled for AVX2 as well and chosen at run time.
 #[multiversion(targets("x86_64+avx2+fma"))]
 fn multiply_safely(out: &mut [f32], rows: usize, panels: &[[f32; ROWS]], b: Operand<'_, f32>, update: Update<'_, f32>) {

@@ -199,15 +199,17 @@ fn append_panel<T: Scalar>(panels: &mut Vec<[T; ROWS]>, matrix: Operand<'_, T>, 
     if matrix.transposed {
         // Block by block: a row of a block lies in one line of the cache, and so does a row of a panel.
         for start in (0..matrix.columns()).step_by(ROWS) {
-            let block: [[T; ROWS]; ROWS] = std::array::from_fn(|row| {
-                let values = if row < height { &matrix.stored_column(first + row)[start..] } else { &[] };
-                match values.first_chunk() {
-                    Some(&values) => values,
-                    None => std::array::from_fn(|place| values.get(place).copied().unwrap_or(T::zero())),
-                }
-            });
             let depth = ROWS.min(matrix.columns() - start);
-            panels.extend((0..depth).map(|place| block.map(|row| row[place])));
+            let mut block = [[T::zero(); ROWS]; ROWS];
+            for (row, values) in block.iter_mut().zip(first..first + height) {
+                let values = &matrix.stored_column(values)[start..];
+                match values.first_chunk() {
+                    Some(values) => *row = *values,
+                    None => row[..depth].copy_from_slice(values),
+                }
+            }
+            T::transpose(&mut block);
+            panels.extend_from_slice(&block[..depth]);
         }
     } else {
         panels.extend(matrix.stored_columns().map(|column| match column[first..].first_chunk() {

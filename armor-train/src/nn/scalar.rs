@@ -43,6 +43,10 @@ pub trait Scalar: RealField + Copy + Serialize + DeserializeOwned + 'static {
     fn product(out: &mut [Self], a: Operand<'_, Self>, b: Operand<'_, Self>, update: Update<'_, Self>, ahead: &Ahead) {
         Packed::new(a).multiply(out, b, update, ahead);
     }
+    /// Exchanges rows and columns of a block.
+    fn transpose(block: &mut [[Self; ROWS]; ROWS]) {
+        kernel::transpose(block);
+    }
     /// The value of a recorded number.
     fn of_f32(value: f32) -> Self {
         Self::of(f64::from(value))
@@ -80,6 +84,9 @@ impl Scalar for f32 {
     }
     fn product(out: &mut [Self], a: Operand<'_, Self>, b: Operand<'_, Self>, update: Update<'_, Self>, ahead: &Ahead) {
         kernel::product_f32(out, a, b, update, ahead);
+    }
+    fn transpose(block: &mut [[Self; ROWS]; ROWS]) {
+        kernel::transpose_f32(block);
     }
 }
 

@@ -5,6 +5,8 @@
 //! multiply-adds. The order of a sum is that of [`super`], so are the bits.
 #![allow(unsafe_code)]
 
+mod transpose;
+
 use core::arch::x86_64::*;
 
 use super::ROWS;
@@ -64,6 +66,12 @@ impl Avx512 {
         let left = Left { values: a.values(), rows: a.rows(), depth: a.columns(), step: a.rows(), panel: ROWS };
         // SAFETY: as above; an operand has all its values.
         unsafe { multiply(out, left, b, update, ahead) }
+    }
+
+    /// Exchanges rows and columns of a block.
+    pub(super) fn transpose(self, block: &mut [[f32; ROWS]; ROWS]) {
+        // SAFETY: `self` is the proof that the processor has AVX-512.
+        unsafe { transpose::transpose(block) }
     }
 }
 
