@@ -60,11 +60,12 @@ impl<T: Scalar> Chain<T> {
         for (index, step) in self.steps.iter().enumerate() {
             let gradient = index >= forgotten;
             let slot = index.saturating_sub(forgotten);
-            let ahead = self.written_soon(slot);
+            let ahead = gradient.then(|| self.written_soon(slot));
+            let weights = ahead.as_ref().map_or(weights, |ahead| weights.fetching(ahead));
             let call = &mut self.calls[slot];
             call.action.copy_from(&self.action);
             call.levels.fill(step.n);
-            denoiser.forward(weights.fetching(&ahead), context, call, gradient);
+            denoiser.forward(weights, context, call, gradient);
             let [from_action, from_noise, to_x0, to_action, sigma] = coefficients::<T>(step);
             for (sample, mut column) in self.action.column_iter_mut().enumerate() {
                 if step.sigma != 0.0 {
@@ -91,18 +92,18 @@ impl<T: Scalar> Chain<T> {
         }
     }
 
-    /// What the products of a call may fetch: the rest of what it writes, and half of what the next one does.
+    /// What the products of a call fetch: the later half of what it writes, and the earlier half of the next one.
     fn written_soon(&self, slot: usize) -> Ahead {
-        let half = 3;
-        let next = self.calls.get(slot + 1).into_iter().flat_map(|call| call.written().take(half));
-        Ahead::new(self.calls[slot].written().skip(half).chain(next))
+        const HALF: usize = 3;
+        let next = self.calls.get(slot + 1).into_iter().flat_map(|call| call.written().take(HALF));
+        Ahead::new(self.calls[slot].written().skip(HALF).chain(next))
     }
 
-    /// What the products of a backward pass may fetch.
+    /// What the products of a backward pass fetch: what it reads last, and what the one after it reads before.
     fn read_soon(&self, slot: usize) -> Ahead {
-        let inner = 2;
-        let next = self.calls[..slot].last().into_iter().flat_map(|call| call.slopes().take(inner));
-        Ahead::new(self.calls[slot].slopes().skip(inner).chain(next))
+        const BEFORE: usize = 2;
+        let next = self.calls[..slot].last().into_iter().flat_map(|call| call.slopes().take(BEFORE));
+        Ahead::new(self.calls[slot].slopes().skip(BEFORE).chain(next))
     }
 
     /// Back-propagates `action_gradient`, `A x B`, with respect to the end of

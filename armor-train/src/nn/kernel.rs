@@ -16,8 +16,8 @@ mod avx512;
 use multiversion::multiversion;
 use multiversion::target::target_cfg_f;
 
-use super::{Ahead, Scalar};
 use super::product::{Operand, Packed, Update};
+use super::{Ahead, Scalar};
 
 /// Rows of a tile: two vectors of eight f32.
 pub(super) const ROWS: usize = 16;
@@ -213,7 +213,9 @@ mod tests {
                 let (a_t, b_t) = (a.transpose(), b.transpose());
                 let lefts = [Operand::from(&a), Operand::from(&a_t).transposed()];
                 let rights = [Operand::from(&b), Operand::from(&b_t).transposed()];
-                for update in [Update::Replace, Update::Add, Update::Multiply, Update::Plus(other), Update::Times(other)] {
+                for update in
+                    [Update::Replace, Update::Add, Update::Multiply, Update::Plus(other), Update::Times(other)]
+                {
                     let mut expected = before.clone();
                     by_the_letter(&mut expected, &a, &b, update);
                     for (left, right) in lefts.into_iter().flat_map(|left| rights.map(|right| (left, right))) {
@@ -222,7 +224,7 @@ mod tests {
                             let mut out = before.clone();
                             match way {
                                 "product" => product(out.as_mut_slice(), left, right, update),
-                                "packed" => packed.multiply(out.as_mut_slice(), right, update, Ahead::nothing()),
+                                "packed" => packed.multiply(out.as_mut_slice(), right, update, &Ahead::new([other])),
                                 _ => multiply_safely(out.as_mut_slice(), m, packed.panels(), right, update),
                             }
                             assert_eq!(bits(&out), bits(&expected), "{way}, {m} x {k} x {n}, {update:?}");

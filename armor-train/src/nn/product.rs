@@ -4,8 +4,8 @@ use std::slice::SliceIndex;
 
 use nalgebra::DMatrix;
 
-use super::{Ahead, Scalar};
 use super::kernel::{self, ROWS};
+use super::{Ahead, Scalar};
 
 /// A matrix to be read: stored column by column, or the transpose of one that is.
 #[derive(Clone, Copy)]

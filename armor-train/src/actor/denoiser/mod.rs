@@ -128,8 +128,8 @@ impl Denoiser {
         self.body.forward(weights, &call.hidden, &mut call.body, slopes);
     }
 
-    /// Back-propagates [`Call::noise_gradient`]: adds to `gradient` and to the
-    /// gradients in `context`, and writes [`Call::action_gradient`].
+    /// Back-propagates [`Call::noise_gradient`]: adds the gradient of `W_a` to `gradient` and to the
+    /// gradients in `context`, and writes [`Call::action_gradient`]. [`Denoiser::add_body_gradient`] shall follow.
     pub fn backward<'a, T: Scalar>(
         &self,
         weights: impl Into<Weights<'a, T>>,
@@ -166,8 +166,8 @@ impl Denoiser {
     pub fn add_body_gradient<T: Scalar>(&self, calls: &[Call<T>], gradient: &mut [T]) {
         for layer in (0..self.body.layers().len()).rev() {
             for (index, call) in calls.iter().enumerate().rev() {
-                let next = index.checked_sub(1).map(|next| &calls[next]);
-                let ahead = Ahead::new(next.into_iter().flat_map(|next| next.body.around(layer, &next.hidden).map(|m| m.values())));
+                let next = calls[..index].last().into_iter().flat_map(|next| next.body.around(layer, &next.hidden));
+                let ahead = Ahead::new(next.map(|matrix| matrix.values()));
                 self.body.add_layer_gradient(layer, &call.hidden, &call.body, gradient, &ahead);
             }
         }

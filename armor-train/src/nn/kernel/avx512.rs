@@ -99,13 +99,7 @@ struct Target<'a> {
 /// # Safety
 /// All numbers that `left` describes lie within its values.
 #[target_feature(enable = "avx512f")]
-unsafe fn multiply(
-    out: &mut [f32],
-    left: Left<'_>,
-    b: Operand<'_, f32>,
-    update: Update<'_, f32>,
-    ahead: &Ahead,
-) {
+unsafe fn multiply(out: &mut [f32], left: Left<'_>, b: Operand<'_, f32>, update: Update<'_, f32>, ahead: &Ahead) {
     assert_eq!(out.len(), left.rows * b.columns(), "the result has rows times columns values");
     assert_eq!(left.depth, b.rows(), "inner dimensions agree");
     if let Update::Plus(other) | Update::Times(other) = update {
@@ -145,7 +139,12 @@ unsafe fn strips<const UPDATE: u8>(target: Target<'_>, left: Left<'_>, b: Operan
 /// # Safety
 /// As [`strips`]; `P` panels begin at `first` or below it.
 #[target_feature(enable = "avx512f")]
-unsafe fn strip<const UPDATE: u8, const P: usize>(target: Target<'_>, left: Left<'_>, first: usize, b: Operand<'_, f32>) {
+unsafe fn strip<const UPDATE: u8, const P: usize>(
+    target: Target<'_>,
+    left: Left<'_>,
+    first: usize,
+    b: Operand<'_, f32>,
+) {
     // SAFETY: handed on.
     unsafe {
         let at = tiles::<UPDATE, P, 12>(target, left, first, b, 0);
