@@ -192,7 +192,7 @@ unsafe fn tiles<const UPDATE: u8, const P: usize, const C: usize>(
             }
         }
         // A quarter of a line for each place of the inner dimension; without work, lines that are at hand.
-        let mut ahead = target.ahead.next(left.depth / 4).map_or(a, core::ptr::with_exposed_provenance);
+        let mut ahead = target.ahead.next(left.depth / 4).map_or(a, core::ptr::without_provenance);
         for _ in 0..left.depth {
             _mm_prefetch::<_MM_HINT_T1>(ahead.cast());
             ahead = ahead.wrapping_add(4);
