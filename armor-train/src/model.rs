@@ -137,6 +137,7 @@ impl Model {
             gaussian_std: config.gaussian_std,
             variance: config.reverse_variance,
             temperature: config.temperature,
+            clip: config.x0_clip,
         };
         let denoiser = Denoiser::new(widths, config.condition_scale());
         let denoiser = match config.time_frequencies {

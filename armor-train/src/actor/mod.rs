@@ -28,7 +28,7 @@ use denoiser::Denoiser;
 pub use guidance::{CloningNorm, Guidance};
 pub use improvement::PolicyGradient;
 pub use loss::ActorLoss;
-pub use process::{Family, Process, ReverseVariance};
+pub use process::{EstimateClip, Family, Process, ReverseVariance};
 pub use tape::ActorTape;
 
 /// The actor: its network, its schedule, and how it is improved.

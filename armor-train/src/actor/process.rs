@@ -32,6 +32,19 @@ pub enum ReverseVariance {
     Beta,
 }
 
+/// Where a chain's estimate `x0` of the clean action is clipped to the bounds (O-26).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum EstimateClip {
+    /// At every step; clipped entries pass no gradient.
+    EachStep,
+    /// At the last one alone, which is the action.
+    LastStep,
+}
+
+/// Divisor of estimates that no bound shall reach: a power of two, so that no bit is lost.
+const OUT_OF_REACH: f64 = (1u32 << 20) as f64;
+
 /// A policy's family and the settings of its chains.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Process {
@@ -45,6 +58,8 @@ pub struct Process {
     pub variance: ReverseVariance,
     /// Factor on the noise that DDPM steps add.
     pub temperature: f64,
+    /// Where the estimate is clipped.
+    pub clip: EstimateClip,
 }
 
 impl Process {
@@ -56,10 +71,14 @@ impl Process {
             gaussian_std: 0.0,
             variance: ReverseVariance::Posterior,
             temperature: 1.0,
+            clip: EstimateClip::EachStep,
         }
     }
 
     /// A chain of `length` steps (see [`Schedule::chain`]); the one step of a Gaussian.
+    ///
+    /// A step that shall not clip estimates a 2^20th of the action, so the controllers that
+    /// clip every estimate fly it unchanged.
     pub fn chain(&self, sampler: Sampler, length: usize) -> Vec<ChainStep<f64>> {
         if self.family == Family::Gaussian {
             return vec![self.estimate(1)];
@@ -73,6 +92,11 @@ impl Process {
                 step.sigma = (1.0 - self.schedule.alpha_bar(step.n) / self.schedule.alpha_bar(next)).sqrt();
             }
             step.sigma *= self.temperature;
+            if self.clip == EstimateClip::LastStep {
+                step.from_action /= OUT_OF_REACH;
+                step.from_noise /= OUT_OF_REACH;
+                step.to_x0 *= OUT_OF_REACH;
+            }
         }
         chain
     }
@@ -109,5 +133,28 @@ mod tests {
             assert!((step.sigma - expected).abs() < 1e-12);
             assert_eq!(ChainStep { sigma: plain.sigma, ..step }, plain);
         }
+    }
+
+    /// The formula of [`ChainStep`] by the letter, in f32, with and without the clip.
+    #[test]
+    fn a_chain_clips_where_it_is_asked_to_with_no_bit_lost() {
+        let paper = Process::paper(Schedule::cosine(20));
+        let free = Process { clip: EstimateClip::LastStep, ..paper };
+        let [paper, free] = [paper, free].map(|process| process.chain(Sampler::Ddpm, 20));
+        let run = |step: &ChainStep<f64>, action: f32, noise: f32, bound: f32| {
+            let [from_action, from_noise, to_x0, to_action] =
+                [step.from_action, step.from_noise, step.to_x0, step.to_action].map(|x| x as f32);
+            to_x0 * (from_action * action - from_noise * noise).clamp(-bound, bound) + to_action * action
+        };
+        let mut clipped = 0;
+        for (paper, free) in paper.iter().zip(&free) {
+            for (action, noise) in [(0.3, -0.2), (-2.5, 1.5), (4.0, -3.0), (-0.9, 0.4)] {
+                let bound = if paper.n == 1 { 1.0 } else { f32::INFINITY };
+                let expected = run(paper, action, noise, bound);
+                assert_eq!(run(free, action, noise, 1.0), expected, "step {}", paper.n);
+                clipped += u32::from(run(paper, action, noise, 1.0) != expected);
+            }
+        }
+        assert!(clipped > 40);
     }
 }

@@ -12,7 +12,7 @@ use std::path::PathBuf;
 use armor_core::schedule::{Noising, Sampler};
 use serde::{Deserialize, Serialize};
 
-use crate::actor::{CloningNorm, Family, Guidance, PolicyGradient, ReverseVariance};
+use crate::actor::{CloningNorm, EstimateClip, Family, Guidance, PolicyGradient, ReverseVariance};
 use crate::critic::bootstrap::Bootstrap;
 use crate::critic::{CostHeads, CostOutput, Trunk, TwinLoss, Twins};
 use crate::data::{Mask, Unfinished};
@@ -85,6 +85,8 @@ pub struct Config {
     pub noise_schedule: Noising,
     /// Variance of a DDPM step (O-27).
     pub reverse_variance: ReverseVariance,
+    /// Where a chain's estimate of the clean action is clipped (O-26).
+    pub x0_clip: EstimateClip,
     /// Factor on the noise that DDPM steps add (O-27).
     pub temperature: f64,
     /// Standard deviation of a Gaussian policy, in units of the action's bounds.

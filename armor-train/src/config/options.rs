@@ -90,6 +90,11 @@ pub const OPTIONS: [(&str, &[Entry]); 6] = [
                 "reverse_variance",
                 "variance of a DDPM step: `posterior`, or `beta`, the larger one of the forward step (O-27)",
             ),
+            (
+                "x0_clip",
+                "where a chain clips its estimate of the clean action to the bounds: at `each_step`, where \
+                 clipped entries pass no gradient, or at the `last_step` alone (O-26)",
+            ),
             ("temperature", "factor on the noise that DDPM steps add; below 1 the policy is less random (O-27)"),
             ("gaussian_std", "standard deviation of a gaussian policy, in units of the action's bounds"),
             ("hidden", "units of the denoiser's three hidden layers (Appendix B)"),

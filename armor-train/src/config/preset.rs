@@ -4,7 +4,7 @@ use armor_core::schedule::{Noising, Sampler};
 use serde::{Deserialize, Serialize};
 
 use super::{Config, KappaUnit, RewardUnit};
-use crate::actor::{CloningNorm, Family, Guidance, PolicyGradient, ReverseVariance};
+use crate::actor::{CloningNorm, EstimateClip, Family, Guidance, PolicyGradient, ReverseVariance};
 use crate::critic::bootstrap::Bootstrap;
 use crate::critic::{CostHeads, CostOutput, Trunk, TwinLoss, Twins};
 use crate::data::{Mask, Unfinished};
@@ -72,6 +72,7 @@ impl Preset {
             diffusion_steps: 20,
             noise_schedule: Noising::Vp,
             reverse_variance: ReverseVariance::Posterior,
+            x0_clip: EstimateClip::EachStep,
             temperature: 1.0,
             gaussian_std: 0.1,
             hidden: 256,

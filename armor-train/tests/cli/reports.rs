@@ -164,6 +164,7 @@ fn every_kind_of_policy_flies() {
         ("gaussian", &gaussian[..], 1),
         ("cosine", &["noise_schedule=cosine", "diffusion_steps=20"], 5),
         ("beta", &["reverse_variance=beta", "temperature=0.5"], 3),
+        ("unclipped", &["x0_clip=last_step"], 3),
     ] {
         let set = options.iter().flat_map(|option| ["--set".to_owned(), (*option).to_owned()]);
         bench.success(&ball_run(name, 20).into_iter().chain(set).collect::<Vec<_>>());
