@@ -96,11 +96,23 @@ impl Critic {
     /// Room for passes over `samples` columns.
     pub fn tape<T: Scalar>(&self, samples: usize) -> CriticTape<T> {
         let inputs = self.state + 1 + self.action;
+        // One forward pass serves all tasks, each of which goes back on its own.
+        let is_shared = |network_of: fn(&CriticOptions, Task) -> usize, index| {
+            Task::ALL.into_iter().filter(|&task| network_of(&self.options, task) == index).count() > 1
+        };
+        let tape = |network: &Mlp, is_shared| match network.tape(samples) {
+            tape if is_shared => tape.repeatable(),
+            tape => tape,
+        };
+        let trunks = self.trunks.iter().enumerate();
+        let heads = self.heads.iter().enumerate();
         CriticTape {
             options: self.options,
             input: DMatrix::zeros(inputs, samples),
-            trunks: self.trunks.iter().map(|trunk| trunk.tape(samples).repeatable()).collect(),
-            heads: self.heads.iter().map(|twins| twins.each_ref().map(|head| head.tape(samples))).collect(),
+            trunks: trunks.map(|(index, trunk)| tape(trunk, is_shared(CriticOptions::trunk_of, index))).collect(),
+            heads: heads
+                .map(|(pair, twins)| twins.each_ref().map(|head| tape(head, is_shared(CriticOptions::head_of, pair))))
+                .collect(),
             input_gradient: DMatrix::zeros(inputs, samples),
         }
     }

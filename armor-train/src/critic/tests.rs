@@ -74,6 +74,21 @@ fn td_gradients_are_those_of_finite_differences_in_every_layout() {
 }
 
 #[test]
+fn one_forward_pass_serves_the_gradients_of_all_tasks_in_every_layout() {
+    for f in LAYOUTS.map(fixture) {
+        let mut tape = f.critic.tape(SAMPLES);
+        f.critic.forward(&f.parameters, &Task::ALL, (&f.state, &f.kappa, &f.action), &mut tape, true);
+        for task in Task::ALL {
+            let (mut gradient, mut trunk) = (vec![0.0; f.critic.size()], vec![0.0; f.critic.trunk_size()]);
+            let gradients = (&mut gradient[..], &mut trunk[..]);
+            f.critic.backward_td(&f.parameters, task, &f.target, SAMPLES, &mut tape, gradients);
+            gradient[..trunk.len()].copy_from_slice(&trunk);
+            assert_eq!(gradient, f.td(task, &f.parameters).0, "{task:?} of {:?}", f.critic.options);
+        }
+    }
+}
+
+#[test]
 fn action_gradients_are_those_of_finite_differences_in_every_layout() {
     let picks = [Twins::Pessimistic, Twins::Minimum, Twins::Mean, Twins::Random, Twins::Random];
     for (f, (index, twins)) in LAYOUTS.map(fixture).into_iter().zip(picks.into_iter().enumerate()) {

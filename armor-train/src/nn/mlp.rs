@@ -44,7 +44,7 @@ impl Mlp {
         if let (None, Some(last)) = (self.output, slopes.last_mut()) {
             *last = DMatrix::zeros(0, 0);
         }
-        Tape { values, slopes, output_gradient, deltas: Vec::new(), columns: samples }
+        Tape { values, slopes, output_gradient, deltas: Vec::new(), columns: samples, has_slopes: false }
     }
 
     /// What follows a layer.
@@ -61,7 +61,7 @@ impl Mlp {
         slopes: bool,
     ) {
         let weights = weights.into();
-        tape.columns = input.ncols();
+        (tape.columns, tape.has_slopes) = (input.ncols(), slopes);
         for (index, layer) in self.layers.iter().enumerate() {
             let (before, rest) = tape.values.split_at_mut(index);
             let input = before.last().unwrap_or(input);
@@ -81,6 +81,9 @@ impl Mlp {
     /// Adds to `gradient` (as long as the parameters) where it is given. Where `input_gradient`
     /// is given, the gradient with respect to the input updates it.
     /// After [`Tape::keep`] this holds for the leading columns of input and gradients alone.
+    ///
+    /// # Panics
+    /// If the forward pass left no slopes, or an earlier backward pass wrote over them.
     pub fn backward<'a, T: Scalar>(
         &self,
         weights: impl Into<Weights<'a, T>>,
@@ -90,7 +93,9 @@ impl Mlp {
         mut input_gradient: Option<(&mut DMatrix<T>, Update<'_, T>)>,
     ) {
         let weights = weights.into();
-        let Tape { values, slopes, output_gradient, deltas, columns } = tape;
+        assert!(tape.has_slopes, "a backward pass needs slopes that no other one wrote over");
+        tape.has_slopes = !tape.deltas.is_empty();
+        let Tape { values, slopes, output_gradient, deltas, columns, .. } = tape;
         if let (Some(_), Some(slopes)) = (self.output, slopes.last()) {
             scale(output_gradient, slopes, *columns);
         }

@@ -17,6 +17,8 @@ pub struct Tape<T: Scalar> {
     pub(super) deltas: Vec<DMatrix<T>>,
     /// Columns of the above that hold samples.
     pub(super) columns: usize,
+    /// Whether the slopes are those of the last forward pass.
+    pub(super) has_slopes: bool,
 }
 
 impl<T: Scalar> Tape<T> {
