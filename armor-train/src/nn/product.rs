@@ -201,8 +201,8 @@ fn append_panel<T: Scalar>(panels: &mut Vec<[T; ROWS]>, matrix: Operand<'_, T>, 
         for start in (0..matrix.columns()).step_by(ROWS) {
             let depth = ROWS.min(matrix.columns() - start);
             let mut block = [[T::zero(); ROWS]; ROWS];
-            for (row, values) in block.iter_mut().zip(first..first + height) {
-                let values = &matrix.stored_column(values)[start..];
+            for (row, column) in block.iter_mut().zip(first..first + height) {
+                let values = &matrix.stored_column(column)[start..];
                 match values.first_chunk() {
                     Some(values) => *row = *values,
                     None => row[..depth].copy_from_slice(values),

@@ -15,10 +15,9 @@ pub(super) fn transpose(block: &mut [[f32; ROWS]; ROWS]) {
     let mut fours = rows;
     for (four, row) in fours.chunks_exact_mut(4).zip(rows.chunks_exact(4)) {
         // Numbers 0 and 1 of the lanes, then 2 and 3: of rows 0 and 1, then of 2 and 3.
-        let [low, low_below] = [(row[0], row[1]), (row[2], row[3])].map(|(a, b)| _mm512_unpacklo_ps(a, b));
-        let [high, high_below] = [(row[0], row[1]), (row[2], row[3])].map(|(a, b)| _mm512_unpackhi_ps(a, b));
-        let [low, low_below] = [low, low_below].map(|pair| _mm512_castps_pd(pair));
-        let [high, high_below] = [high, high_below].map(|pair| _mm512_castps_pd(pair));
+        let pairs = [(row[0], row[1]), (row[2], row[3])];
+        let [low, low_below] = pairs.map(|(a, b)| _mm512_castps_pd(_mm512_unpacklo_ps(a, b)));
+        let [high, high_below] = pairs.map(|(a, b)| _mm512_castps_pd(_mm512_unpackhi_ps(a, b)));
         four[0] = _mm512_castpd_ps(_mm512_unpacklo_pd(low, low_below));
         four[1] = _mm512_castpd_ps(_mm512_unpackhi_pd(low, low_below));
         four[2] = _mm512_castpd_ps(_mm512_unpacklo_pd(high, high_below));
